@@ -1,0 +1,1 @@
+"""Programs: the only place that wires the parts of WSM together."""

@@ -1,0 +1,1 @@
+"""Library half of WSM: from raw navigation trajectories to shards, and back."""

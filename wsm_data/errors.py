@@ -1,0 +1,101 @@
+"""The errors of the project, and the codes under which bad data is refused.
+
+`WsmError` is foreseen and its message is for a person. Only `DataError` is survivable: the runner quarantines the
+unit and goes on. Anything else is a bug and ends the run with a traceback.
+"""
+
+from collections.abc import Mapping
+from enum import StrEnum
+
+
+class Reason(StrEnum):
+    """Why a unit was refused, or what was noted about it. Tests and reports speak of these codes."""
+
+    # containers: an archive, a scene folder, a trajectory folder
+    ARCHIVE_POINTER_FILE = "archive.pointer_file"
+    ARCHIVE_NOT_GZIP = "archive.not_gzip"
+    ARCHIVE_TRUNCATED = "archive.truncated"
+    ARCHIVE_CORRUPT = "archive.corrupt"
+    ARCHIVE_UNSAFE_MEMBER = "archive.unsafe_member"
+    CONTAINER_NO_EPISODES = "container.no_episodes"
+
+    # episodes
+    EPISODE_DUPLICATE = "episode.duplicate"
+    EPISODE_TOO_SHORT = "episode.too_short"
+    EPISODE_LENGTH_MISMATCH = "episode.length_mismatch"  # a note: episodes.jsonl disagrees with what is stored
+
+    # frames
+    FRAME_EMPTY = "frame.empty"
+    FRAME_TRUNCATED = "frame.truncated"
+    FRAME_UNDECODABLE = "frame.undecodable"
+    FRAME_MISSING = "frame.missing"
+    FRAME_COUNT_MISMATCH = "frame.count_mismatch"
+    FRAME_SIZE_MISMATCH = "frame.size_mismatch"
+    DEPTH_NOT_16_BIT = "depth.not_16_bit"
+    DEPTH_NO_MEASUREMENT = "depth.no_measurement"
+
+    # the parquet table of an episode
+    TABLE_UNREADABLE = "table.unreadable"
+    TABLE_MISSING_COLUMN = "table.missing_column"
+    TABLE_ROW_COUNT = "table.row_count"
+    TABLE_BAD_SHAPE = "table.bad_shape"
+    POSE_NOT_FINITE = "pose.not_finite"
+    POSE_NOT_RIGID = "pose.not_rigid"
+    POSE_JUMP = "pose.jump"
+    POSE_DEPTH_DISAGREE = "pose.depth_disagree"
+    INTRINSICS_MISFIT = "intrinsics.misfit"
+    MOUNT_MISFIT = "mount.misfit"
+
+    # point clouds and maps
+    CLOUD_MISSING = "cloud.missing"  # a note when the map is fused from depth instead
+    CLOUD_UNREADABLE = "cloud.unreadable"
+    CLOUD_HEADER = "cloud.header"
+    CLOUD_EMPTY = "cloud.empty"
+    CLOUD_NO_OBSTACLES = "cloud.no_obstacles"
+    MAP_TOO_LARGE = "map.too_large"
+    PATH_THROUGH_OBSTACLE = "path.through_obstacle"
+    GOAL_UNREACHABLE = "goal.unreachable"
+
+
+class WsmError(Exception):
+    """A foreseen failure. The message says what must hold, what was found, where, and what to do."""
+
+    exit_code = 1
+
+
+class ConfigError(WsmError):
+    """The request itself is wrong; raised before any work is done."""
+
+    exit_code = 2
+
+
+class BudgetExceeded(WsmError):
+    """More units were refused than the run allows."""
+
+    exit_code = 3
+
+
+class IntegrityError(WsmError):
+    """Stored bytes disagree with an index, a checksum, a fingerprint or a version."""
+
+    exit_code = 4
+
+
+class DataError(WsmError):
+    """This unit is unusable: it is quarantined under `reason`, and the run goes on.
+
+    Args:
+        reason: the code under which the refusal is counted.
+        message: what must hold, what was found, where, and what to do.
+        details: the measured numbers and names behind the message; JSON values only.
+    """
+
+    def __init__(self, reason: Reason, message: str, details: Mapping[str, object] | None = None):
+        super().__init__(message)
+        self.reason = reason
+        self.message = message
+        self.details = dict(details or {})
+
+    def __reduce__(self) -> tuple[type["DataError"], tuple[Reason, str, dict[str, object]]]:
+        """Cross a process boundary whole; the default keeps only the message."""
+        return DataError, (self.reason, self.message, self.details)

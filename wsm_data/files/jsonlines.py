@@ -1,0 +1,63 @@
+"""JSON in one canonical spelling, and files of one JSON object a line."""
+
+import json
+import os
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+
+from wsm_data.errors import IntegrityError
+from wsm_data.files.atomic import write_bytes
+
+
+def canonical_json(value: object) -> str:
+    """Return the one spelling under which equal values have equal bytes: sorted keys, no spaces, no NaN."""
+    return json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+
+
+def append_line(path: Path, record: Mapping[str, object]) -> None:
+    """Append one record and flush it to disk, so that a line that was returned from survives a kill."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("ab") as file:
+        file.write(canonical_json(record).encode() + b"\n")
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def write_lines(path: Path, records: Iterable[Mapping[str, object]]) -> None:
+    """Write all records atomically, replacing what was there."""
+    write_bytes(path, b"".join(canonical_json(record).encode() + b"\n" for record in records))
+
+
+def read_lines(path: Path) -> Iterator[dict[str, object]]:
+    """Yield the records of a file; a file that does not exist has none.
+
+    A last line without its newline is what a killed writer leaves: it is passed over.
+
+    Raises:
+        IntegrityError: a complete line is not a JSON object.
+    """
+    if not path.exists():
+        return
+    with path.open("rb") as file:
+        for number, line in enumerate(file, start=1):
+            if line.endswith(b"\n"):
+                yield _parse(path, number, line)
+
+
+def drop_torn_line(path: Path) -> None:
+    """Cut the unfinished last line that a killed writer left, so that the next append starts a line of its own."""
+    if not path.exists():
+        return
+    data = path.read_bytes()
+    if data and not data.endswith(b"\n"):
+        write_bytes(path, data[: data.rfind(b"\n") + 1])
+
+
+def _parse(path: Path, number: int, line: bytes) -> dict[str, object]:
+    try:
+        record = json.loads(line)
+    except ValueError as error:
+        raise IntegrityError(f"{path}:{number} is not JSON ({error}); restore the file or delete the line") from error
+    if not isinstance(record, dict):
+        raise IntegrityError(f"{path}:{number} must hold one JSON object, found {type(record).__name__}")
+    return record

@@ -1,0 +1,107 @@
+"""One stored sample: the arrays of a clip, the table of its members, and its provenance."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from wsm_data.schema.arrays import (
+    Float16Array,
+    Float32Array,
+    Uint8Array,
+    Uint16Array,
+    frozen_array,
+    require_array,
+    require_finite,
+)
+from wsm_data.schema.camera import Intrinsics
+from wsm_data.schema.clip_meta import ClipMeta
+
+MEMBERS: Mapping[str, tuple[np.dtype[np.generic], str]] = MappingProxyType(
+    {
+        "rgb_latent": (np.dtype(np.float16), "FChw"),
+        "depth_latent": (np.dtype(np.float16), "FChw"),
+        "depth_valid": (np.dtype(np.uint8), "Fhw"),
+        "poses": (np.dtype(np.float32), "T7"),
+        "occupancy": (np.dtype(np.uint8), "YX"),
+        "geodesic_mm": (np.dtype(np.uint16), "YX"),
+        "expert_distance": (np.dtype(np.float32), "T"),
+    }
+)
+"""Array members of a clip in the order in which they are stored: dtype and axes. `meta.json` comes last."""
+
+META_MEMBER = "meta.json"
+UNREACHABLE_MM = 65535
+TEMPORAL_RATIO = 4
+_QUATERNION_TOLERANCE = 1e-5  # float32 rounding of four numbers of size one
+
+
+@dataclass(frozen=True, kw_only=True)
+class Clip:
+    """One sequence of T = 1 + 4k raw frames and F = 1 + k latent frames.
+
+    Attributes:
+        meta: provenance and everything that is a number rather than an array.
+        rgb_latent: codec latents of the colour video, not standardised; float16 [F, C, h, w].
+        depth_latent: codec latents of the log-depth video, not standardised; float16 [F, C, h, w].
+        depth_valid: share of valid depth pixels per latent cell, 0..255; uint8 [F, h, w].
+        poses: camera in the first camera's frame, xyz (m) and quaternion wxyz; float32 [T, 7], row 0 is the identity.
+        occupancy: 0 free, 1 occupied, 255 unknown; uint8 [Y, X].
+        geodesic_mm: distance to the goal region, mm; uint16 [Y, X], 65535 unreachable or occupied.
+        expert_distance: geodesic distance D(x_t) of the expert, m; float32 [T].
+    """
+
+    meta: ClipMeta
+    rgb_latent: Float16Array
+    depth_latent: Float16Array
+    depth_valid: Uint8Array
+    poses: Float32Array
+    occupancy: Uint8Array
+    geodesic_mm: Uint16Array
+    expert_distance: Float32Array
+
+    def __post_init__(self) -> None:
+        sizes: dict[str, int] = {}
+        for name, (dtype, axes) in MEMBERS.items():
+            array = getattr(self, name)
+            shape = tuple(7 if axis == "7" else sizes.get(axis) for axis in axes)
+            require_array(name, array, dtype, shape)
+            sizes.update({axis: size for axis, size in zip(axes, array.shape, strict=True) if axis != "7"})
+            if array.dtype.kind == "f":
+                require_finite(name, array)
+            object.__setattr__(self, name, frozen_array(array))
+        frames, latents = sizes["T"], sizes["F"]
+        if frames != 1 + TEMPORAL_RATIO * (latents - 1):
+            raise ValueError(f"F latent frames need T = 1 + 4 (F - 1) raw frames, found F = {latents}, T = {frames}")
+        _require_poses(self.poses)
+
+    @property
+    def frame_count(self) -> int:
+        """T, the number of raw frames, padding included."""
+        return len(self.poses)
+
+    @property
+    def latent_count(self) -> int:
+        """F, the number of latent frames, padding included."""
+        return len(self.rgb_latent)
+
+    @property
+    def intrinsics(self) -> Intrinsics:
+        """Camera at the size the latents decode to."""
+        return self.meta.intrinsics
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """The array members by name, in stored order."""
+        return {name: getattr(self, name) for name in MEMBERS}
+
+
+def _require_poses(poses: Float32Array) -> None:
+    identity = np.array([0, 0, 0, 1, 0, 0, 0], np.float32)
+    if not np.array_equal(poses[0], identity):
+        raise ValueError(f"poses must start with the identity {identity.tolist()}, found {poses[0].tolist()}")
+    error = np.abs(np.linalg.norm(poses[:, 3:].astype(np.float64), axis=1) - 1)
+    if error.max() > _QUATERNION_TOLERANCE:
+        raise ValueError(f"quaternions must be unit, found one off by {error.max():.2e} in frame {error.argmax()}")
+    if (poses[:, 3] < 0).any():
+        raise ValueError(f"quaternions must have w >= 0, found w < 0 in frame {int((poses[:, 3] < 0).argmax())}")

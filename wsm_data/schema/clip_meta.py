@@ -1,0 +1,104 @@
+"""Provenance of a clip and its small numbers: what stands in `meta.json`."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from wsm_data.schema.arrays import Float64Array
+from wsm_data.schema.camera import Intrinsics
+from wsm_data.schema.depth import DepthRange
+from wsm_data.schema.identity import EpisodeId
+
+CLIP_FORMAT_VERSION = 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClipMeta:
+    """Where a clip comes from and how it was made. Numbers are float64 and survive JSON to the bit.
+
+    Attributes:
+        key: key of the sample in its shard.
+        id: the trajectory.
+        dataset: name of the source's manifest.
+        source_digest: content digest of the trajectory, the same in every layout it can be stored in.
+        map_digest: digest of the scene map that was cropped.
+        intrinsics: camera at the encoded size.
+        T_world_camera0: first camera to world; 4 x 4 nested tuples, m.
+        goal_world_m: last camera position in the world, m.
+        goal_camera0_m: the same point in the first camera's frame, m.
+        map_origin_cell: (ix, iy) of cell (0, 0) of the crop on the world's grid.
+        map_resolution_m: side of a map cell, m.
+        map_from: `cloud` or `depth`.
+        freed_cells: unknown cells that are free because the expert's footprint swept them.
+        goal_radius_m: radius r_g of the goal region, m.
+        robot_radius_m: radius of the footprint by which obstacles were inflated, m.
+        camera_height_m: height of the camera above the floor, m.
+        camera_pitch_rad: pitch down from the horizontal, rad.
+        frames: T, raw frames in the clip, padding included.
+        padded_frames: how many raw frames at the end repeat the last one.
+        codec: name of the codec.
+        codec_digest: digest of the codec's settings and weights.
+        depth_range: metric range of the log-depth normalisation.
+        latent_dtype: dtype in which latents are stored.
+        notes: reason codes of what was accepted but is worth knowing.
+        format_version: version of this format.
+    """
+
+    key: str
+    id: EpisodeId
+    dataset: str
+    source_digest: str
+    map_digest: str
+    intrinsics: Intrinsics
+    T_world_camera0: tuple[tuple[float, ...], ...]
+    goal_world_m: tuple[float, float, float]
+    goal_camera0_m: tuple[float, float, float]
+    map_origin_cell: tuple[int, int]
+    map_resolution_m: float
+    map_from: str
+    freed_cells: int
+    goal_radius_m: float
+    robot_radius_m: float
+    camera_height_m: float
+    camera_pitch_rad: float
+    frames: int
+    padded_frames: int
+    codec: str
+    codec_digest: str
+    depth_range: DepthRange
+    latent_dtype: str = "float16"
+    notes: tuple[str, ...] = ()
+    format_version: int = CLIP_FORMAT_VERSION
+
+    @property
+    def T_world_camera0_matrix(self) -> Float64Array:  # noqa: N802 - the symbol's own name
+        """First camera to world, float64 [4, 4], m."""
+        return np.array(self.T_world_camera0, np.float64)
+
+    def to_json(self) -> dict[str, Any]:
+        """JSON object of all fields."""
+        return asdict(self)
+
+    @classmethod
+    def from_json(cls, record: Mapping[str, Any]) -> "ClipMeta":
+        """Inverse of `to_json`.
+
+        Raises:
+            ValueError: the format version is another, or a field is missing or unknown.
+        """
+        if record.get("format_version") != CLIP_FORMAT_VERSION:
+            found = record.get("format_version")
+            raise ValueError(f"clip format_version must be {CLIP_FORMAT_VERSION}, found {found!r}; use a matching wsm")
+        names = {field.name for field in fields(cls)}
+        if set(record) != names:
+            raise ValueError(f"meta.json must have exactly the fields of ClipMeta, differing: {set(record) ^ names}")
+        nested = {
+            "id": EpisodeId(**record["id"]),
+            "intrinsics": Intrinsics(**record["intrinsics"]),
+            "depth_range": DepthRange(**record["depth_range"]),
+            "T_world_camera0": tuple(tuple(row) for row in record["T_world_camera0"]),
+        }
+        tuples = {name: tuple(record[name]) for name in ("goal_world_m", "goal_camera0_m", "map_origin_cell", "notes")}
+        return cls(**{**record, **nested, **tuples})

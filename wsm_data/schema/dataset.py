@@ -1,0 +1,92 @@
+"""The conventions of a source, as its manifest under manifests/datasets/ states them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from wsm_data.schema.depth import DepthEncoding
+
+
+@dataclass(frozen=True, kw_only=True)
+class Robot:
+    """The body for which a source's expert planned.
+
+    Attributes:
+        radius_m: radius of the cylinder, m.
+        ground_clearance_m: what is lower above the floor is driven over, m.
+    """
+
+    radius_m: float = 0.25
+    ground_clearance_m: float = 0.15
+
+
+@dataclass(frozen=True, kw_only=True)
+class CloudColours:
+    """How the points of a coloured scene cloud are told apart; colours in [0, 1], distance is the sum of |difference|.
+
+    Attributes:
+        obstacle_rgb: colour of obstacle points.
+        path_rgb: colour of expert path points, which are not part of the scene.
+        tolerance: colours nearer than this count as equal.
+    """
+
+    obstacle_rgb: tuple[float, float, float] = (0.0, 0.0, 0.5)
+    path_rgb: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    tolerance: float = 0.05
+
+
+@dataclass(frozen=True, kw_only=True)
+class CameraModel:
+    """What is published about a camera of a source; None where nothing is.
+
+    Attributes:
+        width: image width, px.
+        height: image height, px.
+        fx: focal length, px.
+        fy: focal length, px.
+        cx: principal point, px.
+        cy: principal point, px.
+    """
+
+    width: int | None = None
+    height: int | None = None
+    fx: float | None = None
+    fy: float | None = None
+    cx: float | None = None
+    cy: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class DatasetManifest:
+    """Every convention the reader applies; nothing about a source stands in code.
+
+    Attributes:
+        name: name of the data set, stored in every clip.
+        licence: licence of the source, as its publisher states it.
+        homepage: where the source is described.
+        camera_axes: axes of the stored camera poses: `opengl` (x right, y up, z backward) or `opencv`.
+        depth: how depth images are stored.
+        robot: the expert's body.
+        cloud: colours of the scene cloud.
+        cameras: published camera models by camera name (the last word of a group).
+        max_camera_height_m: mounts above this are taken for damage, m.
+        max_pitch_deg: mounts pitched down by more are taken for damage, degrees.
+        min_frames: shorter trajectories are refused.
+        expected_episodes: published number of episodes by group, to compare with what is found.
+    """
+
+    name: str
+    licence: str
+    homepage: str = ""
+    camera_axes: str = "opengl"
+    depth: DepthEncoding
+    robot: Robot = field(default_factory=Robot)
+    cloud: CloudColours = field(default_factory=CloudColours)
+    cameras: Mapping[str, CameraModel] = field(default_factory=dict)
+    max_camera_height_m: float = 2.0
+    max_pitch_deg: float = 45.0
+    min_frames: int = 5
+    expected_episodes: Mapping[str, int] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.camera_axes not in ("opengl", "opencv"):
+            raise ValueError(f"camera_axes must be 'opengl' or 'opencv', found {self.camera_axes!r}")

@@ -1,0 +1,1 @@
+"""The World SLAM Model: built on the releases that `wsm_data` writes."""
