@@ -73,7 +73,7 @@ class ClipMeta:
     format_version: int = CLIP_FORMAT_VERSION
 
     @property
-    def T_world_camera0_matrix(self) -> Float64Array:  # noqa: N802 - the symbol's own name
+    def T_world_camera0_matrix(self) -> Float64Array:
         """First camera to world, float64 [4, 4], m."""
         return np.array(self.T_world_camera0, np.float64)
 

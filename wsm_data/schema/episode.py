@@ -22,6 +22,7 @@ class EpisodeRecord:
         intrinsics: at the size of the stored images.
         camera_height_m: height of the camera above the floor, m; also the height of the robot.
         camera_pitch_rad: pitch down from the horizontal, rad.
+        frames_digest: digest of the image bytes in time order; compared again when the frames are read.
         content_digest: digest of image bytes, poses, intrinsics and mount; the same in every layout.
         notes: reason codes of what was accepted but is worth knowing.
     """
@@ -34,6 +35,7 @@ class EpisodeRecord:
     intrinsics: Intrinsics
     camera_height_m: float
     camera_pitch_rad: float
+    frames_digest: str
     content_digest: str
     notes: tuple[str, ...] = ()
 
