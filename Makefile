@@ -1,0 +1,58 @@
+# `make demo` and `make test` are all that a fresh machine with Python 3.11 or newer needs.
+# The virtual environment is made on the first call and again when pyproject.toml or constraints.txt change.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
+DEMO_OUT ?= runs/demo
+
+.PHONY: demo test check bench clean
+.DELETE_ON_ERROR:
+
+demo: $(VENV)/.ready
+	$(BIN)/wsm demo --out $(DEMO_OUT)
+
+test: $(VENV)/.ready-dev
+	$(BIN)/python -m pytest
+
+check: $(VENV)/.ready-dev
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+bench: $(VENV)/.ready-bench
+	@set -e; for program in bench/*.py; do echo "$$program"; $(BIN)/python "$$program"; done
+
+clean:
+	rm -rf $(VENV) runs
+
+# Each stamp is newer than the files that decided what was installed. Torch, by far the largest package, has a stamp of
+# its own; its version, like every other, stands in constraints.txt alone.
+$(VENV)/.ready: $(VENV)/.torch pyproject.toml
+	@echo "installing wsm"
+	$(PIP) install -c constraints.txt -e .
+	@touch $@
+
+$(VENV)/.ready-dev: $(VENV)/.torch pyproject.toml
+	@echo "installing wsm with its development tools"
+	$(PIP) install -c constraints.txt -e '.[dev]'
+	@touch $(VENV)/.ready $@
+
+$(VENV)/.ready-bench: $(VENV)/.torch pyproject.toml
+	@echo "installing wsm with the peers it is measured against"
+	$(PIP) install -c constraints.txt -e '.[bench]'
+	@touch $(VENV)/.ready $@
+
+$(VENV)/.torch: $(VENV)/.made constraints.txt
+	@echo "installing torch"
+	$(PIP) install "$$(grep '^torch==' constraints.txt)"
+	@touch $@
+
+$(VENV)/.made:
+	@$(PYTHON) -c 'import sys; sys.exit(None if sys.version_info >= (3, 11) else "wsm needs Python 3.11 or newer, found " \
+		+ sys.version.split()[0] + "; name another one with: make PYTHON=python3.12 ...")'
+	@echo "making the virtual environment $(VENV)"
+	$(PYTHON) -m venv $(VENV)
+	@touch $@
