@@ -1,6 +1,7 @@
 """Files that exist whole or not at all: written under a temporary name, flushed to disk, then renamed."""
 
 import os
+import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,17 +14,19 @@ TEMPORARY_SUFFIX = ".partial"
 def atomic_file(path: Path) -> Iterator[BinaryIO]:
     """Open `path` for writing so that readers see the old content, or the whole new one, and nothing between.
 
-    The temporary name carries the process id: two processes writing the same path do not mix their bytes. When the
-    body raises, the temporary file is removed and `path` stays as it was.
+    The temporary name is drawn anew each time: two writers of the same path, in whatever thread or on whatever
+    machine, do not mix their bytes, and the last to finish wins. When the body raises, the temporary file is removed
+    and `path` stays as it was. On return both the bytes and the name are on disk.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}{TEMPORARY_SUFFIX}")
+    temporary = path.with_name(f".{path.name}.{secrets.token_hex(8)}{TEMPORARY_SUFFIX}")
     try:
-        with temporary.open("wb") as file:
+        with temporary.open("xb") as file:
             yield file
             file.flush()
             os.fsync(file.fileno())
         temporary.replace(path)
+        _flush_folder(path.parent)
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise
@@ -41,8 +44,20 @@ def write_text(path: Path, text: str) -> None:
 
 
 def remove_temporaries(folder: Path) -> int:
-    """Delete what killed writers left below `folder`; returns how many files that were."""
+    """Delete what killed writers left below `folder`; returns how many files that were.
+
+    Call it only while nobody writes below `folder`: the files of living writers look the same.
+    """
     leftovers = list(folder.rglob(f".*{TEMPORARY_SUFFIX}"))
     for leftover in leftovers:
         leftover.unlink(missing_ok=True)
     return len(leftovers)
+
+
+def _flush_folder(folder: Path) -> None:
+    """Bring the folder's list of names to disk: without it a power cut may undo a rename that was reported done."""
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

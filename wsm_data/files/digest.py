@@ -7,8 +7,6 @@ import xxhash
 
 from wsm_data.files.jsonlines import canonical_json
 
-_READ_BYTES = 4 << 20
-
 
 def sha256_bytes(data: bytes) -> str:
     """Return the sha256 of `data` in hexadecimal."""
@@ -17,15 +15,12 @@ def sha256_bytes(data: bytes) -> str:
 
 def sha256_file(path: Path) -> str:
     """Return the sha256 of a file in hexadecimal, reading it in pieces."""
-    digest = hashlib.sha256()
     with path.open("rb") as file:
-        while block := file.read(_READ_BYTES):
-            digest.update(block)
-    return digest.hexdigest()
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def digest_json(value: object) -> str:
-    """Return the sha256 of a JSON value in its canonical spelling: equal values, equal digests."""
+    """Return the sha256 of a JSON value in its canonical spelling (`canonical_json`)."""
     return sha256_bytes(canonical_json(value).encode())
 
 

@@ -10,8 +10,16 @@ from wsm_data.files.atomic import write_bytes
 
 
 def canonical_json(value: object) -> str:
-    """Return the one spelling under which equal values have equal bytes: sorted keys, no spaces, no NaN."""
-    return json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+    """Return the one spelling of a JSON value: sorted keys, no spaces, floats in their shortest exact form, ASCII.
+
+    Equal JSON values have equal spellings; 1 and 1.0 are different JSON values. Being ASCII, it can hold the name of
+    a file that is not valid UTF-8, which Python represents by lone surrogates.
+
+    Raises:
+        ValueError: a number is NaN or infinite, which JSON does not have.
+        TypeError: something is not a JSON value, such as a numpy scalar.
+    """
+    return json.dumps(value, sort_keys=True, separators=(",", ":"), allow_nan=False)
 
 
 def append_line(path: Path, record: Mapping[str, object]) -> None:
@@ -45,7 +53,10 @@ def read_lines(path: Path) -> Iterator[dict[str, object]]:
 
 
 def drop_torn_line(path: Path) -> None:
-    """Cut the unfinished last line that a killed writer left, so that the next append starts a line of its own."""
+    """Cut the unfinished last line that a killed writer left, so that the next append starts a line of its own.
+
+    Call it once before the first append to a file that an earlier process may have written.
+    """
     if not path.exists():
         return
     data = path.read_bytes()

@@ -1,6 +1,5 @@
 """Whole files and byte ranges, from a local folder or from any store that fsspec knows."""
 
-import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -55,19 +54,18 @@ class LocalStore:
 
     def read_range(self, name: str, offset: int, size: int) -> bytes:
         """`size` bytes from `offset`; fewer only where the file ends earlier."""
-        descriptor = os.open(Path(self.root) / name, os.O_RDONLY)
-        try:
-            return os.pread(descriptor, size, offset)
-        finally:
-            os.close(descriptor)
+        with (Path(self.root) / name).open("rb") as file:
+            file.seek(offset)
+            return file.read(size)
 
 
 class FsspecStore:
     """A folder behind any fsspec URL, such as s3://bucket/release or memory://release."""
 
     def __init__(self, root: str):
-        self.root = root.rstrip("/")
-        self._filesystem, self._base = fsspec.core.url_to_fs(self.root)
+        self.root = root
+        self._filesystem, base = fsspec.core.url_to_fs(root)
+        self._base = base.rstrip("/")
 
     def exists(self, name: str) -> bool:
         """Whether the file is there."""

@@ -31,7 +31,11 @@ def unproject(depth_m: Float64Array, intrinsics: Intrinsics) -> Float64Array:
 
 
 def project(points_camera: Float64Array, intrinsics: Intrinsics) -> tuple[Float64Array, Float64Array]:
-    """Points [..., 3] (m) of the camera frame to pixels [..., 2] and depth [...] (m); depth <= 0 is behind."""
+    """Points [..., 3] (m) of the camera frame to pixels (u, v) [..., 2] and depth [...] (m).
+
+    Where depth <= 0 the point is not in front of the camera, and its pixel means nothing. Pixels may lie outside the
+    image: whether they do is for the caller to test.
+    """
     z = points_camera[..., 2]
     safe = np.where(z > 0, z, 1.0)
     u = intrinsics.fx * points_camera[..., 0] / safe + intrinsics.cx

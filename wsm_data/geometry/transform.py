@@ -46,12 +46,17 @@ def transforms_from_vectors(vectors: Float64Array) -> Float64Array:
 
 
 def rigidity_error(T_target_source: Float64Array) -> Float64Array:
-    """How far 4 x 4 matrices [..., 4, 4] are from rigid: largest entry of |R^T R - I|, |det R - 1|, |last row - e4|."""
-    rotation = T_target_source[..., :3, :3]
+    """How far 4 x 4 matrices [..., 4, 4] are from rigid: largest entry of |R^T R - I|, |det R - 1|, |last row - e4|.
+
+    Infinite where an entry is not finite, so that comparing with a tolerance refuses such a matrix too.
+    """
+    finite = np.isfinite(T_target_source).all(axis=(-1, -2))
+    T = np.where(finite[..., None, None], T_target_source, np.eye(4))
+    rotation = T[..., :3, :3]
     gram = np.abs(np.swapaxes(rotation, -1, -2) @ rotation - np.eye(3)).max(axis=(-1, -2))
     determinant = np.abs(np.linalg.det(rotation) - 1)
-    last_row = np.abs(T_target_source[..., 3, :] - np.array([0.0, 0.0, 0.0, 1.0])).max(axis=-1)
-    return np.maximum(np.maximum(gram, determinant), last_row)
+    last_row = np.abs(T[..., 3, :] - np.array([0.0, 0.0, 0.0, 1.0])).max(axis=-1)
+    return np.where(finite, np.maximum(np.maximum(gram, determinant), last_row), np.inf)
 
 
 def rotation_angle_rad(rotations: Float64Array) -> Float64Array:

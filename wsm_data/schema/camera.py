@@ -14,8 +14,8 @@ class Intrinsics:
     Attributes:
         fx: focal length along the image's x axis, px.
         fy: focal length along the image's y axis, px.
-        cx: principal point, px.
-        cy: principal point, px.
+        cx: principal point along x, px; the image spans -1/2 to width - 1/2.
+        cy: principal point along y, px.
         width: image width the numbers belong to, px.
         height: image height the numbers belong to, px.
     """
@@ -34,9 +34,9 @@ class Intrinsics:
         for name in ("fx", "fy", "width", "height"):
             if getattr(self, name) <= 0:
                 raise ValueError(f"{name} must be positive, found {getattr(self, name)}")
-        if not (-0.5 <= self.cx < self.width and -0.5 <= self.cy < self.height):
+        if not (-0.5 <= self.cx < self.width - 0.5 and -0.5 <= self.cy < self.height - 0.5):
             raise ValueError(
-                f"the principal point must lie in the {self.width}x{self.height} image, found "
+                f"the principal point (cx, cy) must lie in the {self.width}x{self.height} image, found "
                 f"({self.cx}, {self.cy}); do the intrinsics belong to another image size?"
             )
 

@@ -73,7 +73,12 @@ class Clip:
             object.__setattr__(self, name, frozen_array(array))
         frames, latents = sizes["T"], sizes["F"]
         if frames != 1 + TEMPORAL_RATIO * (latents - 1):
-            raise ValueError(f"F latent frames need T = 1 + 4 (F - 1) raw frames, found F = {latents}, T = {frames}")
+            raise ValueError(
+                f"rgb_latent with F latent frames needs poses of T = 1 + {TEMPORAL_RATIO} (F - 1) raw frames, "
+                f"found F = {latents}, T = {frames}"
+            )
+        if self.meta.frames != frames:
+            raise ValueError(f"meta.frames must be the T = {frames} rows of poses, found {self.meta.frames}")
         _require_poses(self.poses)
 
     @property
@@ -102,6 +107,8 @@ def _require_poses(poses: Float32Array) -> None:
         raise ValueError(f"poses must start with the identity {identity.tolist()}, found {poses[0].tolist()}")
     error = np.abs(np.linalg.norm(poses[:, 3:].astype(np.float64), axis=1) - 1)
     if error.max() > _QUATERNION_TOLERANCE:
-        raise ValueError(f"quaternions must be unit, found one off by {error.max():.2e} in frame {error.argmax()}")
+        raise ValueError(
+            f"poses must hold unit quaternions, found one off by {error.max():.2e} in row {error.argmax()}"
+        )
     if (poses[:, 3] < 0).any():
-        raise ValueError(f"quaternions must have w >= 0, found w < 0 in frame {int((poses[:, 3] < 0).argmax())}")
+        raise ValueError(f"poses must hold quaternions of w >= 0, found w < 0 in row {int((poses[:, 3] < 0).argmax())}")

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from wsm_data.schema.depth import DepthRange
 from wsm_data.schema.identity import EpisodeId
 
 CLIP_FORMAT_VERSION = 1
+_Nested = TypeVar("_Nested", EpisodeId, Intrinsics, DepthRange)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,6 +73,16 @@ class ClipMeta:
     notes: tuple[str, ...] = ()
     format_version: int = CLIP_FORMAT_VERSION
 
+    def __post_init__(self) -> None:
+        if self.map_from not in ("cloud", "depth"):
+            raise ValueError(f"map_from must be 'cloud' or 'depth', found {self.map_from!r}")
+        if not 0 <= self.padded_frames < self.frames:
+            raise ValueError(f"padded_frames must lie in [0, frames = {self.frames}), found {self.padded_frames}")
+        if [len(row) for row in self.T_world_camera0] != [4, 4, 4, 4]:
+            raise ValueError(
+                f"T_world_camera0 must be 4 x 4, found rows of {[len(row) for row in self.T_world_camera0]}"
+            )
+
     @property
     def T_world_camera0_matrix(self) -> Float64Array:
         """First camera to world, float64 [4, 4], m."""
@@ -95,10 +106,19 @@ class ClipMeta:
         if set(record) != names:
             raise ValueError(f"meta.json must have exactly the fields of ClipMeta, differing: {set(record) ^ names}")
         nested = {
-            "id": EpisodeId(**record["id"]),
-            "intrinsics": Intrinsics(**record["intrinsics"]),
-            "depth_range": DepthRange(**record["depth_range"]),
+            "id": _parse(EpisodeId, record["id"]),
+            "intrinsics": _parse(Intrinsics, record["intrinsics"]),
+            "depth_range": _parse(DepthRange, record["depth_range"]),
             "T_world_camera0": tuple(tuple(row) for row in record["T_world_camera0"]),
         }
         tuples = {name: tuple(record[name]) for name in ("goal_world_m", "goal_camera0_m", "map_origin_cell", "notes")}
         return cls(**{**record, **nested, **tuples})
+
+
+def _parse(kind: type[_Nested], record: Mapping[str, Any]) -> _Nested:
+    names = {field.name for field in fields(kind)}
+    if set(record) != names:
+        raise ValueError(
+            f"meta.json: {kind.__name__} must have exactly the fields {sorted(names)}, found {sorted(record)}"
+        )
+    return kind(**record)

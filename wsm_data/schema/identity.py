@@ -2,7 +2,6 @@
 
 import re
 from dataclasses import dataclass
-from urllib.parse import quote
 
 _UNSAFE = re.compile(r"[^A-Za-z0-9_-]")
 
@@ -23,8 +22,8 @@ class EpisodeId:
 
     def __post_init__(self) -> None:
         for field, value in (("group", self.group), ("scene", self.scene), ("episode", self.episode)):
-            if not value or "/" in value:
-                raise ValueError(f"{field} of an episode id must be a non-empty name without '/', found {value!r}")
+            if value in ("", ".", "..") or "/" in value:
+                raise ValueError(f"{field} of an episode id must be a name, not a path, found {value!r}")
 
     @property
     def text(self) -> str:
@@ -63,4 +62,5 @@ class EpisodeId:
 
 
 def _quote(part: str) -> str:
-    return _UNSAFE.sub(lambda match: quote(match[0], safe="").replace(".", "%2E"), part)
+    # surrogatepass: a file name that is not valid UTF-8 has a key as well, and one of its own
+    return _UNSAFE.sub(lambda match: "".join(f"%{byte:02X}" for byte in match[0].encode(errors="surrogatepass")), part)

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wsm_data.schema.arrays import BoolArray, Int16Array, require_array
+from wsm_data.schema.arrays import BoolArray, Int16Array, frozen_array, require_array
 
 CELL_SIZE_M = 0.05
-"""Side of a map cell over the floor, m (spec/interndata_n1.md: maps at 0.05 m)."""
+"""Side of a map cell over the floor, m: the resolution at which InternData-N1's expert planned."""
 
 LAYER_HEIGHT_M = 0.01
 """Height of a box, m: fine enough that the robot's height band is cut to a centimetre."""
@@ -36,3 +36,17 @@ class SurfaceVoxels:
         require_array("obstacle", self.obstacle, np.bool_, (len(self.cells),))
         if self.origin not in ("cloud", "depth"):
             raise ValueError(f"origin must be 'cloud' or 'depth', found {self.origin!r}")
+        _require_strict_order(self.cells)
+        object.__setattr__(self, "cells", frozen_array(self.cells))
+        object.__setattr__(self, "obstacle", frozen_array(self.obstacle))
+
+
+def _require_strict_order(cells: Int16Array) -> None:
+    x, y, z = cells.T.astype(np.int64)
+    rank = (x << 32) + (y << 16) + z  # int16 coordinates: one number whose order is the lexicographic one
+    steps = np.diff(rank)
+    if (steps <= 0).any():
+        row = int((steps <= 0).argmax())
+        raise ValueError(
+            f"cells must be sorted and unique, found {cells[row].tolist()} before {cells[row + 1].tolist()}"
+        )
