@@ -4,7 +4,7 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
+PIP := $(BIN)/python -m pip -qq --disable-pip-version-check
 DEMO_OUT ?= runs/demo
 
 .PHONY: demo test check bench clean
@@ -32,27 +32,27 @@ clean:
 # its own; its version, like every other, stands in constraints.txt alone.
 $(VENV)/.ready: $(VENV)/.torch pyproject.toml
 	@echo "installing wsm"
-	$(PIP) install -c constraints.txt -e .
+	@$(PIP) install -c constraints.txt -e .
 	@touch $@
 
 $(VENV)/.ready-dev: $(VENV)/.torch pyproject.toml
 	@echo "installing wsm with its development tools"
-	$(PIP) install -c constraints.txt -e '.[dev]'
+	@$(PIP) install -c constraints.txt -e '.[dev]'
 	@touch $(VENV)/.ready $@
 
 $(VENV)/.ready-bench: $(VENV)/.torch pyproject.toml
 	@echo "installing wsm with the peers it is measured against"
-	$(PIP) install -c constraints.txt -e '.[bench]'
+	@$(PIP) install -c constraints.txt -e '.[bench]'
 	@touch $(VENV)/.ready $@
 
 $(VENV)/.torch: $(VENV)/.made constraints.txt
 	@echo "installing torch"
-	$(PIP) install "$$(grep '^torch==' constraints.txt)"
+	@$(PIP) install "$$(grep '^torch==' constraints.txt)"
 	@touch $@
 
 $(VENV)/.made:
 	@$(PYTHON) -c 'import sys; sys.exit(None if sys.version_info >= (3, 11) else "wsm needs Python 3.11 or newer, found " \
 		+ sys.version.split()[0] + "; name another one with: make PYTHON=python3.12 ...")'
 	@echo "making the virtual environment $(VENV)"
-	$(PYTHON) -m venv $(VENV)
+	@$(PYTHON) -m venv $(VENV)
 	@touch $@

@@ -22,6 +22,7 @@ class Reason(StrEnum):
     # episodes
     EPISODE_DUPLICATE = "episode.duplicate"
     EPISODE_TOO_SHORT = "episode.too_short"
+    EPISODE_UNSTORABLE_NAME = "episode.unstorable_name"
     EPISODE_LENGTH_MISMATCH = "episode.length_mismatch"  # a note: episodes.jsonl disagrees with what is stored
 
     # frames
@@ -87,7 +88,7 @@ class DataError(WsmError):
     Args:
         reason: the code under which the refusal is counted.
         message: what must hold, what was found, where, and what to do.
-        details: the measured numbers and names behind the message; JSON values only.
+        details: the measured numbers and names behind the message; arrays, NaN and paths are allowed.
     """
 
     def __init__(self, reason: Reason, message: str, details: Mapping[str, object] | None = None):

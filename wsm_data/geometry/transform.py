@@ -50,7 +50,7 @@ def rigidity_error(T_target_source: Float64Array) -> Float64Array:
 
     Infinite where an entry is not finite, so that comparing with a tolerance refuses such a matrix too.
     """
-    finite = np.isfinite(T_target_source).all(axis=(-1, -2))
+    finite = np.asarray(np.isfinite(T_target_source).all(axis=(-1, -2)))
     T = np.where(finite[..., None, None], T_target_source, np.eye(4))
     rotation = T[..., :3, :3]
     gram = np.abs(np.swapaxes(rotation, -1, -2) @ rotation - np.eye(3)).max(axis=(-1, -2))

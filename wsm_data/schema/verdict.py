@@ -1,14 +1,17 @@
 """What a check says of a record, and what is written down when something is refused."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+
+import numpy as np
 
 from wsm_data.errors import DataError, Reason
 
 
 @dataclass(frozen=True, kw_only=True)
 class Verdict:
-    """The outcome of a quality gate: a value, never an exception.
+    """The outcome of a quality gate: a value, never an exception. `measured` is kept as JSON values, as in `Refusal`.
 
     Attributes:
         reason: None to keep the record, else why it is refused.
@@ -20,6 +23,9 @@ class Verdict:
     message: str = ""
     measured: Mapping[str, object] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "measured", _json_value(self.measured))
+
     @property
     def keep(self) -> bool:
         """Whether the record goes on."""
@@ -30,12 +36,15 @@ class Verdict:
 class Refusal:
     """One unit that does not go on: a line of quarantine.jsonl before the runner adds stage and time.
 
+    What broke a unit is often NaN, infinite, an array or a path. So that writing it down never fails, details are
+    turned into JSON values here: numpy values into numbers and lists, what JSON does not have into its text.
+
     Attributes:
         unit: id of the container or episode.
         source: file or folder it came from, relative to the source root.
         reason: the code it is counted under.
         message: for a person.
-        details: measured numbers and names; JSON values.
+        details: measured numbers and names.
     """
 
     unit: str
@@ -44,7 +53,21 @@ class Refusal:
     message: str
     details: Mapping[str, object] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "details", _json_value(self.details))
+
     @classmethod
     def from_error(cls, unit: str, source: str, error: DataError) -> "Refusal":
         """Write down a `DataError` that was raised while working on `unit`."""
         return cls(unit=unit, source=source, reason=error.reason, message=error.message, details=error.details)
+
+
+def _json_value(value: object) -> object:
+    if isinstance(value, Mapping):
+        return {str(key): _json_value(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return _json_value(value.tolist())
+    if isinstance(value, list | tuple):
+        return [_json_value(item) for item in value]
+    exact = value is None or isinstance(value, str | int) or (isinstance(value, float) and math.isfinite(value))
+    return value if exact else str(value)
