@@ -1,0 +1,158 @@
+"""A stage's output folder: stage.json, ledger.jsonl, quarantine.jsonl and the outputs, for one writer at a time."""
+
+import fcntl
+import json
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pipelines.stage import Outcome
+from wsm_data.errors import ConfigError, IntegrityError, Reason
+from wsm_data.files.atomic import write_text
+from wsm_data.files.jsonlines import append_line, drop_torn_line, read_lines, write_lines
+from wsm_data.schema.verdict import Refusal
+
+STAGE_FILE, LEDGER_FILE, QUARANTINE_FILE = "stage.json", "ledger.jsonl", "quarantine.jsonl"
+
+
+@dataclass(frozen=True, kw_only=True)
+class LedgerEntry:
+    """The last word on a unit: the key it was settled under, and what became of it."""
+
+    key: str
+    outcome: Outcome
+
+
+@dataclass(frozen=True, kw_only=True)
+class StageRecord:
+    """What stage.json holds.
+
+    Attributes:
+        name: the stage.
+        version: version of the stage that wrote the folder.
+        settings: every setting that decides the bytes.
+        config: the whole resolved config, input paths included.
+        fingerprint: digest of name, version and settings.
+        inputs: fingerprint of each upstream stage, by the config field that names it.
+        units: number of units in the listing.
+        workers: worker processes of the last run.
+        finished: digest of the outcomes `finish` was last called with; empty before.
+    """
+
+    name: str
+    version: int
+    settings: Mapping[str, Any]
+    config: Mapping[str, Any]
+    fingerprint: str
+    inputs: Mapping[str, str]
+    units: int = 0
+    workers: int = 1
+    finished: str = ""
+
+
+def read_stage_record(folder: Path) -> StageRecord | None:
+    """The record of a stage folder, or None where no stage has written yet.
+
+    Raises:
+        IntegrityError: stage.json is there but unreadable.
+    """
+    path = folder / STAGE_FILE
+    if not path.exists():
+        return None
+    try:
+        return StageRecord(**json.loads(path.read_text()))
+    except (ValueError, TypeError) as error:
+        raise IntegrityError(
+            f"{path} is not a stage record ({error}); delete the folder and run the stage again"
+        ) from error
+
+
+def write_stage_record(folder: Path, record: StageRecord) -> None:
+    """Write stage.json atomically."""
+    write_text(folder / STAGE_FILE, json.dumps(vars(record), indent=2, sort_keys=True) + "\n")
+
+
+def read_ledger(folder: Path) -> dict[str, LedgerEntry]:
+    """The last entry of every unit."""
+    return {
+        str(line["unit"]): LedgerEntry(key=str(line["key"]), outcome=_outcome_from_line(line))
+        for line in read_lines(folder / LEDGER_FILE)
+    }
+
+
+def append_ledger(folder: Path, entry: LedgerEntry) -> None:
+    """Add the outcome of one unit; on disk when the call returns."""
+    outcome = entry.outcome
+    line = {
+        "unit": outcome.unit,
+        "key": entry.key,
+        "state": outcome.state,
+        "digest": outcome.digest,
+        "outputs": list(outcome.outputs),
+        "facts": dict(outcome.facts),
+        "refusals": [refusal_json(refusal) for refusal in outcome.refusals],
+        "seconds": round(outcome.seconds, 4),
+        "time": round(time.time(), 3),
+    }
+    append_line(folder / LEDGER_FILE, line)
+
+
+def write_quarantine(folder: Path, record: StageRecord, refusals: Iterable[Refusal]) -> None:
+    """Write all refusals of the stage, sorted by unit, replacing what an earlier state of the inputs left.
+
+    A refusal that stood there before keeps its time.
+    """
+    path = folder / QUARANTINE_FILE
+    seen = {(line["unit"], line["reason"], line["message"]): line["time"] for line in read_lines(path)}
+    stage = {"stage": record.name, "stage_version": record.version, "fingerprint": record.fingerprint}
+    lines = []
+    for refusal in sorted(refusals, key=lambda one: (one.unit, one.source, one.reason)):
+        line = {**refusal_json(refusal), **stage}
+        identity = (line["unit"], line["reason"], line["message"])
+        lines.append({**line, "time": seen.get(identity, round(time.time(), 3))})
+    write_lines(path, lines)
+
+
+def refusal_json(refusal: Refusal) -> dict[str, Any]:
+    """JSON object of a refusal."""
+    return {**vars(refusal), "reason": str(refusal.reason), "details": dict(refusal.details)}
+
+
+def refusal_from_json(record: Mapping[str, Any]) -> Refusal:
+    """Inverse of `refusal_json`; keys the runner added are passed over."""
+    names = ("unit", "source", "message", "details")
+    return Refusal(reason=Reason(record["reason"]), **{name: record[name] for name in names})
+
+
+@contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Hold the folder against a second writer; the lock falls with the process, however it ends.
+
+    Raises:
+        ConfigError: another process holds it.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    with (folder / ".lock").open("w") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise ConfigError(
+                f"{folder} is being written by another wsm process; wait for it, or use another --out"
+            ) from error
+        drop_torn_line(folder / LEDGER_FILE)
+        yield
+
+
+def _outcome_from_line(line: Mapping[str, Any]) -> Outcome:
+    return Outcome(
+        unit=line["unit"],
+        state=line["state"],
+        digest=line["digest"],
+        outputs=tuple(line["outputs"]),
+        facts=line["facts"],
+        refusals=tuple(refusal_from_json(record) for record in line["refusals"]),
+        seconds=line["seconds"],
+    )

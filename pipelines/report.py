@@ -1,0 +1,98 @@
+"""What a run of a stage did, as a value and as the table that is printed at its end."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from pipelines.stage import DONE, REFUSED, Settled
+
+_MILLION, _THOUSAND = 1e6, 1e4
+
+
+@dataclass(frozen=True, kw_only=True)
+class StageReport:
+    """What a run of a stage did, and where the stage stands.
+
+    Attributes:
+        stage: name of the stage.
+        out: its folder (another than asked for after a fork).
+        listed: units of the inputs.
+        ran: ids of the units this run worked on, or would work on in a dry run.
+        done: units of the listing that are done.
+        refused: units of the listing that are refused.
+        pending: units of the listing that have no outcome yet.
+        refusals: number of refusals by reason; parts of a done unit count too.
+        facts: numeric facts of done units, summed.
+        seconds: wall time of this run.
+    """
+
+    stage: str
+    out: Path
+    listed: int
+    ran: tuple[str, ...]
+    done: int
+    refused: int
+    pending: int
+    refusals: Mapping[str, int] = field(default_factory=dict)
+    facts: Mapping[str, float] = field(default_factory=dict)
+    seconds: float = 0.0
+
+
+def stage_report(stage: str, out: Path, settled: Settled, ran: Sequence[str], seconds: float) -> StageReport:
+    """Count the outcomes of a stage."""
+    outcomes = settled.outcomes.values()
+    facts: dict[str, float] = {}
+    refusals: dict[str, int] = {}
+    for outcome in outcomes:
+        for name, value in outcome.facts.items():
+            if isinstance(value, (int, float)) and not isinstance(value, bool):
+                facts[name] = facts.get(name, 0) + value
+        for refusal in outcome.refusals:
+            refusals[refusal.reason] = refusals.get(refusal.reason, 0) + 1
+    return StageReport(
+        stage=stage,
+        out=out,
+        listed=len(settled.outcomes) + len(settled.pending),
+        ran=tuple(ran),
+        done=sum(outcome.state == DONE for outcome in outcomes),
+        refused=sum(outcome.state == REFUSED for outcome in outcomes),
+        pending=len(settled.pending),
+        refusals=dict(sorted(refusals.items())),
+        facts=facts,
+        seconds=seconds,
+    )
+
+
+def summary_table(reports: Sequence[StageReport]) -> str:
+    """The reports as an aligned table, refusals by reason below."""
+    header = ("stage", "units", "ran", "done", "refused", "pending", "seconds", "facts")
+    rows = [header] + [
+        (
+            report.stage,
+            str(report.listed),
+            str(len(report.ran)),
+            str(report.done),
+            str(report.refused),
+            str(report.pending),
+            f"{report.seconds:.1f}",
+            ", ".join(f"{name} {_number(value)}" for name, value in report.facts.items()),
+        )
+        for report in reports
+    ]
+    widths = [max(len(row[column]) for row in rows) for column in range(len(header))]
+    lines = ["  ".join(_cell(row, column, widths[column]) for column in range(len(row))).rstrip() for row in rows]
+    reasons = [
+        f"  {report.stage}: {count} x {reason}" for report in reports for reason, count in report.refusals.items()
+    ]
+    return "\n".join([*lines, *(["refused or noted, by reason:", *reasons] if reasons else [])])
+
+
+def _cell(row: Sequence[str], column: int, width: int) -> str:
+    is_text = column in (0, len(row) - 1)
+    return row[column].ljust(width) if is_text else row[column].rjust(width)
+
+
+def _number(value: float) -> str:
+    if value >= _MILLION:
+        return f"{value / _MILLION:.1f} M"
+    return f"{value:,.0f}" if value == int(value) or value >= _THOUSAND else f"{value:.2f}"

@@ -1,0 +1,289 @@
+"""Runs one stage: finds what is pending, has an engine do it, writes the ledger, keeps to the budget, finishes."""
+
+import errno
+import fnmatch
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from tqdm import tqdm
+
+from pipelines.config import config_json, differences, settings_of
+from pipelines.engines.local import run_local
+from pipelines.folder import (
+    QUARANTINE_FILE,
+    LedgerEntry,
+    StageRecord,
+    append_ledger,
+    locked,
+    read_ledger,
+    read_stage_record,
+    write_quarantine,
+    write_stage_record,
+)
+from pipelines.report import StageReport, stage_report
+from pipelines.stage import REFUSED, Outcome, Settled, Stage, StageContext, Unit, refused
+from wsm_data.errors import BudgetExceeded, ConfigError, DataError, WsmError
+from wsm_data.files.atomic import remove_temporaries
+from wsm_data.files.digest import digest_json
+from wsm_data.schema.verdict import Refusal
+
+Engine = Callable[[Sequence[Any], Callable[[Any], Iterator[Any]], int], Iterator[Any]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunOptions:
+    """What to run now. None of it is a setting: none of it changes the bytes of a unit.
+
+    Attributes:
+        workers: worker processes.
+        limit: at most this many pending units; 0 for all.
+        only: patterns of unit ids (`gibson_*/*`); empty for all.
+        dry_run: list what would be done and stop.
+        max_refused: units that may be refused: a share of the listing below 1, a number from 1 on.
+        fork: when the settings differ from those in the folder, use a folder beside it instead of stopping.
+        retry_refused: try refused units again although neither their input nor the settings changed.
+        quiet: no progress bar.
+    """
+
+    workers: int = 1
+    limit: int = 0
+    only: tuple[str, ...] = ()
+    dry_run: bool = False
+    max_refused: float = 0.1
+    fork: bool = False
+    retry_refused: bool = False
+    quiet: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Job:
+    """One run of a stage: what is listed, and what the ledger said when it began."""
+
+    stage: Stage[Any]
+    config: Any
+    out: Path
+    record: StageRecord
+    units: Sequence[Unit]
+    keys: Mapping[str, str]
+    ledger: dict[str, LedgerEntry]
+    options: RunOptions
+    engine: Engine
+
+    def settled(self) -> Settled:
+        """Outcomes under the present keys."""
+        outcomes = {
+            unit.id: self.ledger[unit.id].outcome
+            for unit in self.units
+            if unit.id in self.ledger and self.ledger[unit.id].key == self.keys[unit.id]
+        }
+        return Settled(outcomes=outcomes, pending=tuple(unit.id for unit in self.units if unit.id not in outcomes))
+
+
+def run_stage(
+    stage: Stage[Any], config: Any, out: Path, options: RunOptions | None = None, engine: Engine = run_local
+) -> StageReport:
+    """Bring a stage's folder up to date with its inputs.
+
+    A unit is done again when its inputs, the settings or its outputs are not what the ledger says. Killed at any
+    point, the next call goes on where this one was.
+
+    Raises:
+        ConfigError: the folder belongs to other settings, or is being written by another process.
+        BudgetExceeded: more units were refused than `options.max_refused` allows.
+    """
+    options = options or RunOptions()
+    started = time.monotonic()
+    units = stage.list_units(config)
+    _require_unique(stage, units)
+    record = _record(stage, config, len(units), options.workers)
+    out = _choose_folder(out, record, options.fork)
+    keys = {unit.id: unit_key(record, unit) for unit in units}
+    job = _Job(
+        stage=stage,
+        config=config,
+        out=out,
+        record=record,
+        units=units,
+        keys=keys,
+        ledger={},
+        options=options,
+        engine=engine,
+    )
+    if options.dry_run:
+        job.ledger.update(read_ledger(out))
+        return stage_report(stage.name, out, job.settled(), [unit.id for unit in _selected(job)], 0.0)
+    with locked(out):
+        remove_temporaries(out)
+        job.ledger.update(read_ledger(out))
+        todo = _selected(job)
+        finished = _last_finished(out)
+        write_stage_record(out, replace(record, finished="" if todo else finished))
+        _work(job, todo)
+        _finish(job, finished)
+    return stage_report(stage.name, out, job.settled(), [unit.id for unit in todo], time.monotonic() - started)
+
+
+def unit_key(record: StageRecord, unit: Unit) -> str:
+    """Key under which a unit is settled: digest of its inputs' content, the stage's version and its settings."""
+    return digest_json({"fingerprint": record.fingerprint, "inputs": dict(unit.inputs)})
+
+
+def _require_unique(stage: Stage[Any], units: Sequence[Unit]) -> None:
+    twice = [unit for unit, count in Counter(unit.id for unit in units).items() if count > 1]
+    if twice:
+        raise WsmError(f"{stage.name}: unit ids must be unique, found twice: {', '.join(sorted(twice)[:5])}")
+
+
+def _record(stage: Stage[Any], config: Any, units: int, workers: int) -> StageRecord:
+    settings = settings_of(config)
+    return StageRecord(
+        name=stage.name,
+        version=stage.version,
+        settings=settings,
+        config=config_json(config),
+        fingerprint=digest_json({"name": stage.name, "version": stage.version, "settings": settings}),
+        inputs={name: upstream.fingerprint for name, upstream in _upstream(config).items()},
+        units=units,
+        workers=workers,
+    )
+
+
+def _upstream(config: Any) -> dict[str, StageRecord]:
+    """Records of the stages a config takes its inputs from, by field."""
+    folders = {
+        one.name: Path(getattr(config, one.name)) for one in fields(config) if one.metadata.get("role") == "input"
+    }
+    records = {name: read_stage_record(folder) for name, folder in folders.items()}
+    return {name: record for name, record in records.items() if record is not None}
+
+
+def _choose_folder(out: Path, record: StageRecord, fork: bool) -> Path:
+    old = read_stage_record(out)
+    if old is None or old.fingerprint == record.fingerprint:
+        return out
+    if fork:
+        return out.with_name(f"{out.name}-{record.fingerprint[:8]}")
+    if old.name != record.name:
+        raise ConfigError(f"{out} holds the output of `wsm {old.name}`, not of `wsm {record.name}`; use another --out")
+    changes = differences(old.settings, record.settings) or [f"version: {old.version} -> {record.version}"]
+    raise ConfigError(
+        f"{out} was written with other settings of `wsm {record.name}`:\n  "
+        + "\n  ".join(changes)
+        + "\nUse the old settings, another --out, or --fork to write beside it."
+    )
+
+
+def _selected(job: _Job) -> list[Unit]:
+    """Pending units that the options ask for, in the order of the listing."""
+    only = job.options.only
+    chosen = [
+        unit
+        for unit in job.units
+        if not _is_settled(job, unit) and (not only or any(fnmatch.fnmatch(unit.id, one) for one in only))
+    ]
+    return chosen[: job.options.limit] if job.options.limit else chosen
+
+
+def _is_settled(job: _Job, unit: Unit) -> bool:
+    entry = job.ledger.get(unit.id)
+    if entry is None or entry.key != job.keys[unit.id]:
+        return False
+    if entry.outcome.state == REFUSED:
+        return not job.options.retry_refused
+    return all((job.out / name).exists() for name in entry.outcome.outputs)
+
+
+def _work(job: _Job, todo: Sequence[Unit]) -> None:
+    again = {unit.id for unit in todo}
+    settled = job.settled().outcomes
+    refusals = sum(outcome.state == REFUSED for unit, outcome in settled.items() if unit not in again)
+    work = partial(_process_batch, job.stage, job.config, StageContext(out=job.out))
+    hidden = job.options.quiet or not todo
+    with tqdm(total=len(todo), desc=job.stage.name, unit="unit", disable=hidden, dynamic_ncols=True) as bar:
+        for outcome in job.engine(_batches(todo), work, job.options.workers):
+            entry = LedgerEntry(key=job.keys[outcome.unit], outcome=outcome)
+            append_ledger(job.out, entry)
+            job.ledger[outcome.unit] = entry
+            refusals += outcome.state == REFUSED
+            bar.update()
+            _keep_to_budget(job, refusals)
+
+
+def _keep_to_budget(job: _Job, refusals: int) -> None:
+    limit, listed = job.options.max_refused, len(job.units)
+    if refusals <= (limit if limit >= 1 else limit * listed):
+        return
+    _write_refusals(job, ())
+    raise BudgetExceeded(
+        f"{job.stage.name}: {refusals} of {listed} units were refused, more than --max-refused {limit:g} allows; the "
+        f"reasons are in {job.out / QUARANTINE_FILE}. Mend the source, or raise --max-refused and run the same command "
+        "again: what is done is kept."
+    )
+
+
+def _batches(units: Sequence[Unit]) -> list[list[Unit]]:
+    """Units of one batch together, batches in the order in which they first appear."""
+    batches: dict[tuple[str, str], list[Unit]] = {}
+    for unit in units:
+        batches.setdefault(("batch", unit.batch) if unit.batch else ("unit", unit.id), []).append(unit)
+    return list(batches.values())
+
+
+def _process_batch(stage: Stage[Any], config: Any, context: StageContext, batch: Sequence[Unit]) -> Iterator[Outcome]:
+    """Outcomes of one batch, each with the time it took; runs inside a worker."""
+    left = {unit.id: unit for unit in batch}
+    started = time.perf_counter()
+    try:
+        for outcome in stage.process(batch, config, context):
+            del left[outcome.unit]
+            yield replace(outcome, seconds=time.perf_counter() - started)
+            started = time.perf_counter()
+    except DataError as error:
+        for unit in left.values():
+            yield replace(refused(unit, error), seconds=time.perf_counter() - started)
+        return
+    except OSError as error:
+        if error.errno in (errno.ENOSPC, errno.EDQUOT):
+            raise disk_full(context.out) from error
+        raise
+    if left:
+        raise RuntimeError(f"{stage.name} gave no outcome for {', '.join(left)}")
+
+
+def disk_full(folder: Path) -> WsmError:
+    """The error of a write that found no room."""
+    return WsmError(f"the disk of {folder} is full; free space and run the same command again: what is done is kept")
+
+
+def _last_finished(out: Path) -> str:
+    old = read_stage_record(out)
+    return old.finished if old else ""
+
+
+def _finish(job: _Job, finished: str) -> None:
+    """Write what belongs to no single unit, unless it was written for these very outcomes and upstream states."""
+    settled = job.settled()
+    state = digest_json(
+        [
+            *(
+                [unit, one.state, one.digest, [str(two.reason) for two in one.refusals]]
+                for unit, one in settled.outcomes.items()
+            ),
+            list(settled.pending),
+            {name: upstream.finished for name, upstream in _upstream(job.config).items()},
+        ]
+    )
+    if state != finished:
+        extra = job.stage.finish(job.config, StageContext(out=job.out), settled) if job.stage.finish else ()
+        _write_refusals(job, extra)
+    write_stage_record(job.out, replace(job.record, finished=state))
+
+
+def _write_refusals(job: _Job, extra: Sequence[Refusal]) -> None:
+    refusals = [refusal for outcome in job.settled().outcomes.values() for refusal in outcome.refusals]
+    write_quarantine(job.out, job.record, [*refusals, *extra])

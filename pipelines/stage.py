@@ -1,0 +1,110 @@
+"""What a stage is: a frozen bundle of plain functions that turn inputs into files, unit by unit."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+from wsm_data.errors import DataError
+from wsm_data.schema.verdict import Refusal
+
+ConfigT = TypeVar("ConfigT")
+
+DONE, REFUSED = "done", "refused"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Unit:
+    """The smallest piece that is done, retried, resumed or refused as a whole.
+
+    Attributes:
+        id: stable text from the data, never a position in a listing.
+        source: file or folder it comes from, relative to the source root; for quarantine lines.
+        inputs: digest of each input's content, by name. With the stage's version and settings it makes the unit's key.
+        batch: units with the same non-empty batch are given to one worker together, because they share one sequential
+            pass over one archive.
+        payload: what `process` needs to find the inputs again; must pickle. Not part of the key.
+    """
+
+    id: str
+    source: str = ""
+    inputs: Mapping[str, str]
+    batch: str = ""
+    payload: Any = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """What became of one unit.
+
+    Attributes:
+        unit: id of the unit.
+        state: `done` or `refused`.
+        digest: digest of what was written: the input digest of the units that follow from it.
+        outputs: files written, relative to the stage's folder; a unit whose files are gone is done again.
+        facts: JSON values worth keeping in the ledger.
+        refusals: what was refused: the unit itself, or parts of a unit that is done (episodes of a container).
+        seconds: time the unit took.
+    """
+
+    unit: str
+    state: str = DONE
+    digest: str = ""
+    outputs: tuple[str, ...] = ()
+    facts: Mapping[str, Any] = field(default_factory=dict)
+    refusals: tuple[Refusal, ...] = ()
+    seconds: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class StageContext:
+    """What a running stage knows beside its config.
+
+    Attributes:
+        out: the stage's own folder.
+    """
+
+    out: Path
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settled:
+    """The state of a stage after its units, for `finish`.
+
+    Attributes:
+        outcomes: outcome of every unit of the listing that has one, by unit id, in the order of the listing.
+        pending: ids of units that have none yet (a selection was run, or the run was cut short).
+    """
+
+    outcomes: Mapping[str, Outcome]
+    pending: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stage(Generic[ConfigT]):
+    """One step of the pipeline.
+
+    Attributes:
+        name: name of the command and of the folder in a run.
+        version: raised when the bytes written change.
+        summary: one line for the command's help.
+        config_type: keyword-only frozen dataclass of its settings.
+        list_units: all units of the inputs, in a stable order.
+        process: works on the units of one batch and yields an outcome each; a `DataError` that escapes refuses the
+            units that have none yet.
+        finish: called once all selected units are settled and something changed since it was last called; writes what
+            belongs to no single unit and returns refusals that only the whole can know. None where there is nothing.
+    """
+
+    name: str
+    version: int
+    summary: str
+    config_type: type[ConfigT]
+    list_units: Callable[[ConfigT], Sequence[Unit]]
+    process: Callable[[Sequence[Unit], ConfigT, StageContext], Iterator[Outcome]]
+    finish: Callable[[ConfigT, StageContext, Settled], Sequence[Refusal]] | None = None
+
+
+def refused(unit: Unit, error: DataError) -> Outcome:
+    """Outcome of a unit that cannot be used."""
+    return Outcome(unit=unit.id, state=REFUSED, refusals=(Refusal.from_error(unit.id, unit.source, error),))
