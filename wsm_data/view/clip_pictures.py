@@ -1,0 +1,77 @@
+"""Pictures of a clip: what its latents decode to at some of its frames."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from wsm_data.codecs.base import VideoCodec
+from wsm_data.codecs.depth import depth_m_from_latent_video
+from wsm_data.errors import IntegrityError
+from wsm_data.schema.arrays import BoolArray, Float64Array, Uint8Array, require_array
+from wsm_data.schema.clip import TEMPORAL_RATIO, Clip
+from wsm_data.view.depth_colours import depth_picture
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClipPictures:
+    """N frames of a clip as pictures.
+
+    Attributes:
+        frames: which raw frames.
+        rgb_u8: decoded colour; uint8 [N, H, W, 3].
+        depth_u8: decoded depth in the colours of `depth_picture`, grey in the latent cells of which less than half was
+            measured; uint8 [N, H, W, 3].
+        depth_valid_share: share of measured depth pixels in the latent frame of each; float64 [N].
+    """
+
+    frames: tuple[int, ...]
+    rgb_u8: Uint8Array
+    depth_u8: Uint8Array
+    depth_valid_share: Float64Array
+
+    def __post_init__(self) -> None:
+        count = len(self.frames)
+        require_array("rgb_u8", self.rgb_u8, np.uint8, (count, None, None, 3))
+        require_array("depth_u8", self.depth_u8, np.uint8, self.rgb_u8.shape)
+        require_array("depth_valid_share", self.depth_valid_share, np.float64, (count,))
+
+
+def spread_frames(frames: int, count: int) -> tuple[int, ...]:
+    """At most `count` of `frames` frame numbers, evenly spread, the first and the last among them."""
+    return tuple(dict.fromkeys(np.linspace(0, frames - 1, min(count, frames)).round().astype(int).tolist()))
+
+
+def decode_pictures(clip: Clip, codec: VideoCodec, frames: Sequence[int]) -> ClipPictures:
+    """Decode a clip and keep some frames.
+
+    Raises:
+        IntegrityError: the clip was encoded with another codec, whose latents mean something else.
+    """
+    _require_same_codec(clip, codec)
+    chosen = list(frames)
+    rgb = codec.decode(clip.rgb_latent.astype(np.float32))[chosen]
+    depth_video = codec.decode(clip.depth_latent.astype(np.float32))[chosen]
+    depth_m = depth_m_from_latent_video(depth_video, clip.meta.depth_range)
+    latents = [-(-frame // TEMPORAL_RATIO) for frame in chosen]  # latent j >= 1 covers the raw frames 4j - 3 .. 4j
+    cells = clip.depth_valid[latents]
+    return ClipPictures(
+        frames=tuple(chosen),
+        rgb_u8=np.round((np.clip(rgb, -1.0, 1.0) + 1.0) * 127.5).astype(np.uint8),
+        depth_u8=depth_picture(depth_m, clip.meta.depth_range, _measured(cells, depth_m.shape[1:])),
+        depth_valid_share=cells.reshape(len(chosen), -1).mean(axis=1) / 255.0,
+    )
+
+
+def _measured(depth_valid: Uint8Array, size: tuple[int, ...]) -> BoolArray:
+    height, width = size[0] // depth_valid.shape[1], size[1] // depth_valid.shape[2]
+    return np.repeat(np.repeat(depth_valid >= 128, height, axis=1), width, axis=2)
+
+
+def _require_same_codec(clip: Clip, codec: VideoCodec) -> None:
+    info, meta = codec.describe(), clip.meta
+    if info.digest != meta.codec_digest:
+        raise IntegrityError(
+            f"clip {meta.key} was encoded with codec {meta.codec} ({meta.codec_digest}) and only that decodes it, "
+            f"found {info.name} ({info.digest}); open it with the codec its release names"
+        )
