@@ -3,8 +3,14 @@
 from collections.abc import Sequence
 from typing import Protocol
 
-from wsm_data.schema.arrays import Float32Array
+import numpy as np
+
+from wsm_data.schema.arrays import Float32Array, require_array
 from wsm_data.schema.codec import CodecInfo
+
+TEMPORAL_RATIO = 4
+SIDE_MULTIPLE_PX = 32
+"""Sides of a video are multiples of this: 16 pixels a latent cell, and 2 x 2 cells a patch of the transformer."""
 
 
 class VideoCodec(Protocol):
@@ -29,3 +35,30 @@ class VideoCodec(Protocol):
 
     def describe(self) -> CodecInfo:
         """Geometry and identity; the digest covers everything that decides the output."""
+
+
+def require_video(video: Float32Array) -> None:
+    """Check that `video` is what every codec encodes: float32 [1 + 4k, 32 m, 32 n, 3].
+
+    Frames beyond 1 + 4k would be dropped in silence, so another length is refused.
+
+    Raises:
+        ValueError: names what must hold and what was found.
+    """
+    require_array("video", video, np.float32, (None, None, None, 3))
+    frames, height, width, _ = video.shape
+    if frames % TEMPORAL_RATIO != 1:
+        raise ValueError(f"a video must have 1 + 4k frames, found {frames}; pad it with repeats of its last frame")
+    if not height or not width or height % SIDE_MULTIPLE_PX or width % SIDE_MULTIPLE_PX:
+        raise ValueError(f"sides of a video must be multiples of {SIDE_MULTIPLE_PX} px, found {width}x{height}")
+
+
+def require_latents(latents: Float32Array, channels: int) -> None:
+    """Check that `latents` can be decoded: float32 [F, channels, h, w] with F >= 1.
+
+    Raises:
+        ValueError: names what must hold and what was found.
+    """
+    require_array("latents", latents, np.float32, (None, channels, None, None))
+    if not len(latents):
+        raise ValueError("latents must hold at least one frame, found none")

@@ -1,0 +1,126 @@
+"""From the stored frames of an episode to what a codec encodes."""
+
+from collections.abc import Iterator, Sequence
+from typing import TypeVar
+
+import numpy as np
+
+from wsm_data.codecs.base import TEMPORAL_RATIO
+from wsm_data.codecs.depth import log_depth_table, valid_table
+from wsm_data.codecs.images import decode_depth, decode_rgb, resize_depth, resize_rgb
+from wsm_data.errors import DataError, Reason
+from wsm_data.schema.arrays import BoolArray, Float32Array, Uint8Array, Uint16Array
+from wsm_data.schema.depth import DepthEncoding, DepthRange
+
+_Image = TypeVar("_Image", Uint8Array, Uint16Array)
+_HALF_RANGE = np.float32(127.5)
+
+
+def rgb_video(frames: Sequence[bytes], width: int, height: int, where: str) -> Float32Array:
+    """Decode and resize the JPEG frames of an episode.
+
+    Args:
+        frames: bytes of the T files in time order.
+        width: encoded width, px.
+        height: encoded height, px.
+        where: the episode, for messages; the number of the frame is added to it.
+
+    Returns:
+        float32 [T, height, width, 3] in [-1, 1]: rgb / 127.5 - 1.
+
+    Raises:
+        DataError: FRAME_UNDECODABLE; FRAME_SIZE_MISMATCH where a frame's size differs from the first one's.
+    """
+    video = np.empty((len(frames), height, width, 3), np.float32)
+    decoded = (decode_rgb(data, _frame_name(where, "colour", index)) for index, data in enumerate(frames))
+    for target, rgb_u8 in zip(video, _of_one_size(decoded, where, "colour"), strict=True):
+        np.subtract(resize_rgb(rgb_u8, width, height), _HALF_RANGE, out=target, dtype=np.float32)
+        target /= _HALF_RANGE
+    return video
+
+
+def depth_video(
+    frames: Sequence[bytes], encoding: DepthEncoding, depth_range: DepthRange, width: int, height: int, where: str
+) -> tuple[Float32Array, BoolArray]:
+    """Decode, resize and normalise the depth frames of an episode.
+
+    Args:
+        frames: bytes of the T files in time order.
+        encoding: how the source stores depth.
+        depth_range: metric range of the log-depth normalisation.
+        width: encoded width, px.
+        height: encoded height, px.
+        where: the episode, for messages; the number of the frame is added to it.
+
+    Returns:
+        The log-depth video, float32 [T, height, width, 3] in [-1, 1], a read-only view that repeats one channel; and
+        which pixels hold a measurement, bool [T, height, width].
+
+    Raises:
+        DataError: FRAME_UNDECODABLE, DEPTH_NOT_16_BIT; FRAME_SIZE_MISMATCH where a frame's size differs from the
+            first one's.
+    """
+    normalised, is_valid = log_depth_table(encoding, depth_range), valid_table(encoding)
+    channel = np.empty((len(frames), height, width), np.float32)
+    valid = np.empty((len(frames), height, width), bool)
+    decoded = (decode_depth(data, _frame_name(where, "depth", index)) for index, data in enumerate(frames))
+    for index, raw_u16 in enumerate(_of_one_size(decoded, where, "depth")):
+        codes = resize_depth(raw_u16, width, height)
+        channel[index] = normalised[codes]
+        valid[index] = is_valid[codes]
+    return _three_channels(channel), valid
+
+
+def padded_length(frames: int, still_frames: int = 16) -> int:
+    """Length of a clip of `frames` raw frames: the next 1 + 4k, then `still_frames` more.
+
+    The paper is silent about tails; with K M = 16 still frames staying at the goal is learned.
+
+    Raises:
+        ValueError: there is no frame, or `still_frames` is not a whole number of latents.
+    """
+    if frames < 1 or still_frames < 0 or still_frames % TEMPORAL_RATIO:
+        raise ValueError(
+            f"padding needs at least one frame and a multiple of {TEMPORAL_RATIO} still frames, "
+            f"found {frames} and {still_frames}"
+        )
+    return frames + (1 - frames) % TEMPORAL_RATIO + still_frames
+
+
+def pad_frames(video: np.ndarray, frames: int) -> np.ndarray:
+    """Repeat the last entry of the first axis until there are `frames`; a broadcast last axis stays one.
+
+    Raises:
+        ValueError: the video is empty or longer than `frames`.
+    """
+    if not 0 < len(video) <= frames:
+        raise ValueError(f"only a video of 1 to {frames} frames can be padded to {frames}, found {len(video)}")
+    if video.ndim == 4 and video.strides[-1] == 0:
+        return _three_channels(pad_frames(video[..., 0], frames))
+    padded = np.empty((frames, *video.shape[1:]), video.dtype)
+    padded[: len(video)] = video
+    padded[len(video) :] = video[-1]
+    return padded
+
+
+def _three_channels(channel: Float32Array) -> Float32Array:
+    return np.broadcast_to(channel[..., None], (*channel.shape, 3))
+
+
+def _frame_name(where: str, kind: str, index: int) -> str:
+    return f"{where}, {kind} frame {index}"
+
+
+def _of_one_size(images: Iterator[_Image], where: str, kind: str) -> Iterator[_Image]:
+    """Pass the images on; refuse the first whose height or width differs from that of frame 0."""
+    first: tuple[int, ...] | None = None
+    for index, image in enumerate(images):
+        size = image.shape[:2]
+        first = first or size
+        if size != first:
+            message = (
+                f"{_frame_name(where, kind, index)}: all frames of an episode must have one size, found "
+                f"{size[1]}x{size[0]} px after {first[1]}x{first[0]} px in frame 0; repair the source"
+            )
+            raise DataError(Reason.FRAME_SIZE_MISMATCH, message, {"frame": index, "size_px": [size[1], size[0]]})
+        yield image

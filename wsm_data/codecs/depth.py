@@ -1,0 +1,75 @@
+"""Depth as the codec sees it: clipped, logarithmic, replicated to three channels; and back to metres.
+
+u = log(d / d_min) / log(d_max / d_min) with d clipped to [d_min, d_max]; the video is 2u - 1 (the paper, appendix,
+"Depth"). The paper is silent about pixels without a measurement: here they become d_max before encoding, that is +1,
+and the share of measured pixels in each latent cell is stored beside the latents.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wsm_data.codecs.base import TEMPORAL_RATIO
+from wsm_data.schema.arrays import BoolArray, Float32Array, Float64Array, Uint8Array, require_array
+from wsm_data.schema.depth import DepthEncoding, DepthRange
+
+_RAW_CODES = 1 << 16
+_FULL_SHARE = 255
+
+
+def normalise_depth(depth_m: NDArray[np.floating], depth_range: DepthRange) -> Float32Array:
+    """Depth in metres, any shape, to 2u - 1 in [-1, 1]; what is 0, negative or not finite becomes +1."""
+    depth = np.asarray(depth_m, np.float64)
+    measured = np.isfinite(depth) & (depth > 0)
+    clipped = np.clip(np.where(measured, depth, depth_range.max_m), depth_range.min_m, depth_range.max_m)
+    u = np.log(clipped / depth_range.min_m) / np.log(depth_range.max_m / depth_range.min_m)
+    return (2 * u - 1).astype(np.float32)
+
+
+def log_depth_table(encoding: DepthEncoding, depth_range: DepthRange) -> Float32Array:
+    """The normalised depth 2u - 1 of every raw code, float32 [65536]; codes without a measurement hold +1."""
+    depth_m = np.arange(_RAW_CODES) * encoding.metres_per_unit
+    depth_m[list(encoding.invalid_codes)] = 0
+    return normalise_depth(depth_m, depth_range)
+
+
+def valid_table(encoding: DepthEncoding) -> BoolArray:
+    """Whether a raw code is a measurement, bool [65536]."""
+    valid = np.ones(_RAW_CODES, bool)
+    valid[list(encoding.invalid_codes)] = False
+    return valid
+
+
+def depth_m_from_latent_video(video: Float32Array, depth_range: DepthRange) -> Float32Array:
+    """Decoded depth video [T, H, W, 3] to metres, float32 [T, H, W]: mean of the channels, clamp, inverse of the log.
+
+    Pixels without a measurement were encoded as d_max and come back near it; `valid_share` tells them apart.
+    """
+    require_array("video", video, np.float32, (None, None, None, 3))
+    u: Float64Array = (np.clip(video.mean(axis=-1, dtype=np.float64), -1, 1) + 1) / 2
+    return (depth_range.min_m * (depth_range.max_m / depth_range.min_m) ** u).astype(np.float32)
+
+
+def valid_share(valid: BoolArray, spatial_ratio: int = 16) -> Uint8Array:
+    """Share of valid pixels in each latent cell, 0..255.
+
+    Args:
+        valid: which pixels hold a measurement; bool [T, H, W], T = 1 + 4k, sides multiples of `spatial_ratio`.
+        spatial_ratio: pixels of a latent cell's side.
+
+    Returns:
+        uint8 [F, h, w]: latent 0 counts frame 0, latent j >= 1 frames 4j - 3 .. 4j. The share times 255 is rounded to
+        the nearest, halves to even.
+
+    Raises:
+        ValueError: the length or a side does not fit.
+    """
+    require_array("valid", valid, np.bool_, (None, None, None))
+    frames, height, width = valid.shape
+    if frames % TEMPORAL_RATIO != 1 or height % spatial_ratio or width % spatial_ratio:
+        raise ValueError(f"valid must be [1 + 4k, {spatial_ratio} h, {spatial_ratio} w], found {list(valid.shape)}")
+    cells = valid.reshape(frames, height // spatial_ratio, spatial_ratio, width // spatial_ratio, spatial_ratio)
+    in_frame = cells.sum(axis=(2, 4), dtype=np.int64)
+    later = in_frame[1:].reshape(-1, TEMPORAL_RATIO, *in_frame.shape[1:]).sum(axis=1)
+    per_frame = spatial_ratio**2
+    shares = np.concatenate([in_frame[:1] / per_frame, later / (TEMPORAL_RATIO * per_frame)])
+    return np.rint(shares * _FULL_SHARE).astype(np.uint8)

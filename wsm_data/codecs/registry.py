@@ -1,0 +1,74 @@
+"""The codecs by name, and the settings that choose one."""
+
+import difflib
+import importlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from wsm_data.codecs.base import VideoCodec
+from wsm_data.codecs.dct import DctCodec
+from wsm_data.errors import ConfigError
+
+
+@dataclass(frozen=True, kw_only=True)
+class CodecConfig:
+    """Which codec encodes, and how.
+
+    `name`, the content of `weights` and `dtype` decide the latents; the digest in `CodecInfo` covers them. `device` and
+    `batch_clips` decide only speed and memory and stand in no digest: results of `dct` do not know them, those of `wan`
+    agree across them to the rounding of `dtype`, not to the bit.
+
+    Attributes:
+        name: `dct` (built in, no weights) or `wan` (the Wan2.2 VAE; needs the extra `wan`).
+        weights: local folder of `wan` in the diffusers layout (config.json and safetensors); empty for `dct`. Not the
+            path but the bytes in it count.
+        dtype: arithmetic, `float32` or, for `wan`, `bfloat16`.
+        device: `cpu`, `cuda`, or `auto`, which takes cuda where there is one; `dct` runs on the CPU.
+        batch_clips: clips that `wan` encodes at once.
+    """
+
+    name: str = "dct"
+    weights: str = ""
+    dtype: str = "float32"
+    device: str = "auto"
+    batch_clips: int = 1
+
+    def __post_init__(self) -> None:
+        if self.batch_clips < 1:
+            raise ConfigError(f"codec.batch_clips must be at least 1, found {self.batch_clips}")
+
+
+def make_codec(config: CodecConfig) -> VideoCodec:
+    """Build the codec of a configuration.
+
+    Raises:
+        ConfigError: the name is unknown, a setting does not belong to the codec, or its weights cannot be used.
+    """
+    if config.name not in _MAKERS:
+        near = difflib.get_close_matches(config.name, _MAKERS, n=1, cutoff=0)
+        raise ConfigError(
+            f"codec.name must be one of {', '.join(_MAKERS)}, found {config.name!r}; did you mean {near[0]!r}?"
+        )
+    return _MAKERS[config.name](config)
+
+
+def _make_dct(config: CodecConfig) -> VideoCodec:
+    if config.weights or config.dtype != "float32" or config.device not in ("auto", "cpu"):
+        raise ConfigError(
+            "codec dct has no weights and computes in float32 on the CPU, found "
+            f"weights = {config.weights!r}, dtype = {config.dtype!r}, device = {config.device!r}; drop them or take wan"
+        )
+    return DctCodec()
+
+
+def _make_wan(config: CodecConfig) -> VideoCodec:
+    # Loaded by name: this codec imports torch and diffusers, which nobody who uses dct should wait for or need.
+    module = importlib.import_module("wsm_data.codecs.wan")
+    codec: VideoCodec = module.load_wan_codec(
+        config.weights, dtype=config.dtype, device=config.device, batch_clips=config.batch_clips
+    )
+    return codec
+
+
+_MAKERS: Mapping[str, Callable[[CodecConfig], VideoCodec]] = MappingProxyType({"dct": _make_dct, "wan": _make_wan})
