@@ -1,5 +1,6 @@
 """A two-dimensional map of what a robot may drive over."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +31,8 @@ class OccupancyGrid:
         require_array("cells", self.cells, np.uint8, (None, None))
         if not np.isin(self.cells, (FREE, OCCUPIED, UNKNOWN)).all():
             raise ValueError(f"cells must be {FREE}, {OCCUPIED} or {UNKNOWN}, found {np.unique(self.cells).tolist()}")
+        if not (self.resolution_m > 0 and math.isfinite(self.resolution_m)):
+            raise ValueError(f"resolution_m must be a positive length, found {self.resolution_m}")
         object.__setattr__(self, "cells", frozen_array(self.cells))
 
     @property

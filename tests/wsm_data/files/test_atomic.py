@@ -55,17 +55,15 @@ def test_readers_see_the_old_content_until_the_body_has_ended(tmp_path):
 def test_a_body_that_raises_leaves_the_old_content_and_no_temporary(tmp_path, interruption):
     path = tmp_path / "a.txt"
     write_text(path, "old")
-    with pytest.raises(interruption), atomic_file(path) as file:
-        file.write(b"half of the new")
-        raise interruption
+    with pytest.raises(interruption):
+        write_half_and_raise(path, interruption)
     assert path.read_text() == "old"
     assert temporaries(tmp_path) == []
 
 
 def test_a_body_that_raises_leaves_no_file_where_there_was_none(tmp_path):
-    with pytest.raises(ValueError, match="on purpose"), atomic_file(tmp_path / "a.txt") as file:
-        file.write(b"half")
-        raise ValueError("on purpose")
+    with pytest.raises(ValueError, match="on purpose"):
+        write_half_and_raise(tmp_path / "a.txt", ValueError("on purpose"))
     assert list(tmp_path.iterdir()) == []
 
 
@@ -129,6 +127,12 @@ def test_the_file_gets_the_permissions_of_any_new_file(tmp_path):
     (tmp_path / "plain").write_bytes(b"")
     write_bytes(tmp_path / "atomic", b"")
     assert (tmp_path / "atomic").stat().st_mode == (tmp_path / "plain").stat().st_mode
+
+
+def write_half_and_raise(path, interruption):
+    with atomic_file(path) as file:
+        file.write(b"half of the new content")
+        raise interruption
 
 
 def start_half_writer(path):
