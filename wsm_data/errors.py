@@ -18,6 +18,7 @@ class Reason(StrEnum):
     ARCHIVE_CORRUPT = "archive.corrupt"
     ARCHIVE_UNSAFE_MEMBER = "archive.unsafe_member"
     CONTAINER_NO_EPISODES = "container.no_episodes"
+    CONTAINER_SEVERAL_SCENES = "container.several_scenes"
 
     # episodes
     EPISODE_DUPLICATE = "episode.duplicate"

@@ -1,0 +1,146 @@
+"""A clip written once, by `encode`: its share of a shard, and a sidecar that vouches for it."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from wsm_data.errors import IntegrityError
+from wsm_data.files.atomic import write_bytes, write_text
+from wsm_data.files.digest import xxh3_128
+from wsm_data.files.jsonlines import canonical_json
+from wsm_data.schema.clip import Clip
+from wsm_data.schema.clip_meta import ClipMeta
+from wsm_data.shards.clip_bytes import encode_clip
+from wsm_data.shards.members import Member
+from wsm_data.shards.statistics import LatentSums, clip_sums
+
+FRAGMENT_SUFFIX = ".clip"
+SIDECAR_SUFFIX = ".json"
+FRAGMENT_VERSION = 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class FragmentInfo:
+    """What the sidecar says of a fragment.
+
+    Attributes:
+        meta: the clip's own meta data.
+        size_bytes: size of the fragment, a multiple of 512.
+        digest: xxh3_128 of the fragment, in hexadecimal.
+        members: table of the members, offsets from the start of the fragment.
+        rgb_sums: sums of the colour latents, padding left out.
+        depth_sums: sums of the depth latents, padding left out.
+    """
+
+    meta: ClipMeta
+    size_bytes: int
+    digest: str
+    members: tuple[Member, ...]
+    rgb_sums: LatentSums
+    depth_sums: LatentSums
+
+    @property
+    def key(self) -> str:
+        """Key of the clip."""
+        return self.meta.key
+
+    def to_json(self) -> dict[str, object]:
+        """JSON object of all fields."""
+        return {
+            "fragment_version": FRAGMENT_VERSION,
+            "meta": self.meta.to_json(),
+            "size_bytes": self.size_bytes,
+            "digest": self.digest,
+            "members": [asdict(member) for member in self.members],
+            "rgb_sums": self.rgb_sums.to_json(),
+            "depth_sums": self.depth_sums.to_json(),
+        }
+
+    @classmethod
+    def from_json(cls, record: Mapping[str, Any]) -> "FragmentInfo":
+        """Inverse of `to_json`.
+
+        Raises:
+            ValueError: the sidecar has another version.
+        """
+        if record["fragment_version"] != FRAGMENT_VERSION:
+            raise ValueError(f"fragment_version must be {FRAGMENT_VERSION}, found {record['fragment_version']!r}")
+        return cls(
+            meta=ClipMeta.from_json(record["meta"]),
+            size_bytes=int(record["size_bytes"]),
+            digest=str(record["digest"]),
+            members=tuple(Member(**{**member, "shape": tuple(member["shape"])}) for member in record["members"]),
+            rgb_sums=LatentSums.from_json(record["rgb_sums"]),
+            depth_sums=LatentSums.from_json(record["depth_sums"]),
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fragment:
+    """The bytes of a clip in a tar, with what its sidecar will say.
+
+    Attributes:
+        data: tar headers, members and padding; no end of archive.
+        info: the sidecar.
+    """
+
+    data: bytes
+    info: FragmentInfo
+
+
+def build_fragment(clip: Clip) -> Fragment:
+    """Serialise a clip; equal clips give equal bytes.
+
+    Raises:
+        DataError: `episode.unstorable_name`, the key cannot stand in a tar that webdataset reads.
+        ValueError: the key of the meta data is not the key of its id, or its frame counts disagree with the arrays.
+    """
+    if clip.meta.frames != clip.frame_count:
+        raise ValueError(f"{clip.meta.key}: meta says {clip.meta.frames} frames, the poses have {clip.frame_count}")
+    data, members = encode_clip(clip)
+    rgb_sums, depth_sums = clip_sums(clip)
+    info = FragmentInfo(
+        meta=clip.meta,
+        size_bytes=len(data),
+        digest=xxh3_128(data),
+        members=members,
+        rgb_sums=rgb_sums,
+        depth_sums=depth_sums,
+    )
+    return Fragment(data=data, info=info)
+
+
+def fragment_path(folder: Path, key: str) -> Path:
+    """Where the fragment of a clip stands below the folder of the encode stage."""
+    return folder / f"{key}{FRAGMENT_SUFFIX}"
+
+
+def write_fragment(folder: Path, fragment: Fragment) -> Path:
+    """Write a fragment and then its sidecar, each atomically; a fragment with a sidecar is complete.
+
+    Returns:
+        Path of the fragment.
+    """
+    path = fragment_path(folder, fragment.info.key)
+    sidecar = path.with_suffix(SIDECAR_SUFFIX)
+    sidecar.unlink(missing_ok=True)  # an old sidecar must not vouch for new bytes, should this be killed between
+    write_bytes(path, fragment.data)
+    write_text(sidecar, canonical_json(fragment.info.to_json()) + "\n")
+    return path
+
+
+def read_fragment_info(path: Path) -> FragmentInfo:
+    """Read the sidecar of the fragment at `path`.
+
+    Raises:
+        IntegrityError: there is no sidecar, or it is not one of this version.
+    """
+    sidecar = path.with_suffix(SIDECAR_SUFFIX)
+    try:
+        return FragmentInfo.from_json(json.loads(sidecar.read_bytes()))
+    except FileNotFoundError as error:
+        raise IntegrityError(f"{path} has no sidecar {sidecar.name}, so it is unfinished; encode it again") from error
+    except (ValueError, TypeError, KeyError) as error:
+        raise IntegrityError(f"{sidecar} must be the sidecar of a fragment, but: {error!r}; encode it again") from error

@@ -1,0 +1,155 @@
+"""dataset.json: what a release is, written last and read first."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, is_dataclass
+from typing import Any
+
+from wsm_data.errors import IntegrityError
+from wsm_data.files.digest import sha256_bytes
+from wsm_data.schema.codec import CodecInfo
+from wsm_data.schema.depth import DepthRange
+from wsm_data.shards.statistics import LatentStatistics
+
+RELEASE_SCHEMA_VERSION = 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class ShardInfo:
+    """One shard of a release.
+
+    Attributes:
+        name: file name.
+        split: split of all its clips.
+        clips: number of clips.
+        bytes: size of the file.
+        sha256: digest of the file, in hexadecimal.
+    """
+
+    name: str
+    split: str
+    clips: int
+    bytes: int
+    sha256: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReleaseManifest:
+    """Everything that is to be known of a release before its shards are opened.
+
+    No time, host or path stands in it: the same clips give the same bytes anywhere.
+
+    Attributes:
+        name: name of the release.
+        clips: number of clips.
+        frames: raw frames of all clips, padding included.
+        latents: latent frames of all clips, padding included.
+        clips_by_split: clips of each split.
+        clips_by_group: clips of each data set group.
+        shards: the shards, by name.
+        index_sha256: digest of index.parquet.
+        inventory_sha256: digest of inventory.parquet.
+        quarantine_sha256: digest of quarantine.jsonl.
+        codec: the codec of all clips.
+        rgb_statistics: of the colour latents of the training split.
+        depth_statistics: of the depth latents of the training split.
+        depth_range: metric range of the log-depth normalisation of all clips.
+        encoded_width_px: width of the images that were encoded, px.
+        encoded_height_px: height of the images that were encoded, px.
+        fingerprints: fingerprint of each stage the clips went through, by its name.
+        licences: licence of each source, by the name of its data set.
+        drops: refused units by reason.
+        pending: units that were not worked on yet; 0 unless `partial`.
+        codec_quality: measured quality of the codec.
+        parent: digest of the release this one was selected from, or None.
+        partial: whether only a part of the source was worked on (`--limit`, `--only`).
+        schema_version: version of the release format.
+    """
+
+    name: str
+    clips: int
+    frames: int
+    latents: int
+    clips_by_split: Mapping[str, int]
+    clips_by_group: Mapping[str, int]
+    shards: tuple[ShardInfo, ...]
+    index_sha256: str
+    inventory_sha256: str
+    quarantine_sha256: str
+    codec: CodecInfo
+    rgb_statistics: LatentStatistics
+    depth_statistics: LatentStatistics
+    depth_range: DepthRange
+    encoded_width_px: int
+    encoded_height_px: int
+    fingerprints: Mapping[str, str]
+    licences: Mapping[str, str]
+    drops: Mapping[str, int]
+    pending: int
+    codec_quality: Mapping[str, object] = field(default_factory=dict)
+    parent: str | None = None
+    partial: bool = False
+    schema_version: int = RELEASE_SCHEMA_VERSION
+
+
+def manifest_bytes(manifest: ReleaseManifest) -> bytes:
+    """The one spelling of dataset.json: sorted keys, two spaces, a newline at the end."""
+    text = json.dumps(_plain(manifest), sort_keys=True, indent=2, ensure_ascii=False, allow_nan=False)
+    return text.encode() + b"\n"
+
+
+def release_digest(manifest: ReleaseManifest) -> str:
+    """Digest by which selections and models name a release: the sha256 of its dataset.json."""
+    return sha256_bytes(manifest_bytes(manifest))
+
+
+def parse_manifest(data: bytes, where: str) -> ReleaseManifest:
+    """Inverse of `manifest_bytes`.
+
+    Args:
+        data: content of a dataset.json.
+        where: its place, for messages.
+
+    Raises:
+        IntegrityError: it is not a manifest of this schema version, to the byte.
+    """
+    try:
+        record = json.loads(data)
+        version = record["schema_version"]
+        if version != RELEASE_SCHEMA_VERSION:
+            raise ValueError(f"schema_version must be {RELEASE_SCHEMA_VERSION}, found {version!r}; use a matching wsm")
+        manifest = _from_json(record)
+        if manifest_bytes(manifest) != data:
+            raise ValueError("it is spelled differently from how it was written; restore the file")
+    except (ValueError, TypeError, KeyError) as error:
+        raise IntegrityError(f"{where} must be the manifest of a release, but: {error}") from error
+    return manifest
+
+
+def _from_json(record: Mapping[str, Any]) -> ReleaseManifest:
+    codec = dict(record["codec"])
+    for name in ("latent_mean", "latent_std"):
+        codec[name] = tuple(codec[name])
+    parsed = {
+        "shards": tuple(ShardInfo(**shard) for shard in record["shards"]),
+        "codec": CodecInfo(**codec),
+        "rgb_statistics": _statistics(record["rgb_statistics"]),
+        "depth_statistics": _statistics(record["depth_statistics"]),
+        "depth_range": DepthRange(**record["depth_range"]),
+    }
+    return ReleaseManifest(**{**record, **parsed})
+
+
+def _statistics(record: Mapping[str, Any]) -> LatentStatistics:
+    return LatentStatistics(count=record["count"], mean=tuple(record["mean"]), std=tuple(record["std"]))
+
+
+def _plain(value: object) -> object:
+    """JSON values of a manifest: dataclasses and mappings to objects, tuples to lists."""
+    if is_dataclass(value):
+        return {item.name: _plain(getattr(value, item.name)) for item in fields(value)}
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return value

@@ -1,0 +1,147 @@
+"""A finished release, opened for reading: by path, or by the URL of any store that fsspec knows."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from wsm_data.errors import ConfigError, IntegrityError
+from wsm_data.files.digest import sha256_bytes
+from wsm_data.files.stores import Store, open_store
+from wsm_data.schema.clip import Clip
+from wsm_data.schema.codec import CodecInfo
+from wsm_data.shards.clip_bytes import check_members, decode_clip
+from wsm_data.shards.index import IndexTable, parse_index
+from wsm_data.shards.index_row import IndexRow
+from wsm_data.shards.inventory import InventoryRow, parse_inventory, parse_quarantine
+from wsm_data.shards.manifest import ReleaseManifest, parse_manifest
+from wsm_data.shards.names import INDEX_NAME, INVENTORY_NAME, MANIFEST_NAME, QUARANTINE_NAME
+
+
+@dataclass(frozen=True, eq=False)
+class Release:
+    """A release whose manifest and index agree; clips are read one at a time.
+
+    Attributes:
+        store: where the files are.
+        manifest: dataset.json.
+        index: index.parquet.
+    """
+
+    store: Store
+    manifest: ReleaseManifest
+    index: IndexTable
+
+    def read_clip(self, key: str, verify: bool = True) -> Clip:
+        """Read one clip with a single ranged read; its arrays are read-only views of the bytes that were read.
+
+        Args:
+            key: key of the clip.
+            verify: compare the checksum of every member.
+
+        Raises:
+            ConfigError: the release has no such clip.
+            IntegrityError: names shard, clip and member that are damaged; or the clip's codec is not the release's.
+        """
+        row = self.index.row(key)
+        where = f"{row.shard}, clip {key}"
+        data = memoryview(self._read(row, where))
+        if verify:
+            check_members(data, row.members_in_clip, where)
+        clip = decode_clip(data, row.members_in_clip, where)
+        if (clip.meta.key, clip.meta.codec_digest) != (key, self.manifest.codec.digest):
+            raise IntegrityError(
+                f"{where}: the meta data must be of this clip and codec digest {self.manifest.codec.digest}, found "
+                f"{clip.meta.key} and {clip.meta.codec} with {clip.meta.codec_digest}"
+            )
+        return clip
+
+    def require_codec(self, codec: CodecInfo) -> None:
+        """Check that latents of this release may be decoded by `codec`, or mixed with others of it.
+
+        Raises:
+            ConfigError: it is another codec, or the same with other settings or weights.
+        """
+        own = self.manifest.codec
+        if codec.digest != own.digest:
+            raise ConfigError(
+                f"the release {self.manifest.name} was encoded with {own.name} (digest {own.digest}), and latents of "
+                f"codecs must not be mixed; found {codec.name} (digest {codec.digest}). Use the codec of the release"
+            )
+
+    @cached_property
+    def inventory(self) -> Sequence[InventoryRow]:
+        """Every unit that went in, sorted by unit."""
+        data = checked_file(self.store, INVENTORY_NAME, self.manifest.inventory_sha256)
+        return parse_inventory(data, f"{self.store.root}/{INVENTORY_NAME}")
+
+    @cached_property
+    def quarantine(self) -> Sequence[dict[str, object]]:
+        """Every refusal with reason, message and details, sorted by unit."""
+        data = checked_file(self.store, QUARANTINE_NAME, self.manifest.quarantine_sha256)
+        return parse_quarantine(data, f"{self.store.root}/{QUARANTINE_NAME}")
+
+    def _read(self, row: IndexRow, where: str) -> bytes:
+        try:
+            data = self.store.read_range(row.shard, row.clip_offset, row.clip_size)
+        except FileNotFoundError as error:
+            raise IntegrityError(f"{where}: the shard is missing from {self.store.root}; fetch it again") from error
+        if len(data) != row.clip_size:
+            raise IntegrityError(
+                f"{where}: the clip must have {row.clip_size} bytes at {row.clip_offset}, found {len(data)}; the shard "
+                "is cut, fetch it again"
+            )
+        return data
+
+
+def open_release(location: str | Path) -> Release:
+    """Open the release at a path or URL.
+
+    Raises:
+        ConfigError: there is no such folder.
+        IntegrityError: the release is unfinished (no dataset.json), of another schema version, or its index is not the
+            one the manifest vouches for.
+    """
+    store = open_store(location)
+    manifest = read_manifest(store)
+    data = checked_file(store, INDEX_NAME, manifest.index_sha256)
+    index = parse_index(data, f"{store.root}/{INDEX_NAME}")
+    if len(index) != manifest.clips:
+        raise IntegrityError(
+            f"{store.root}: the manifest counts {manifest.clips} clips, the index has {len(index)} rows"
+        )
+    return Release(store, manifest, index)
+
+
+def read_manifest(store: Store) -> ReleaseManifest:
+    """Read dataset.json.
+
+    Raises:
+        ConfigError: there is no such folder.
+        IntegrityError: the release is unfinished, or its manifest is not one of this schema version.
+    """
+    if not store.exists(MANIFEST_NAME):
+        try:
+            store.names()
+        except (FileNotFoundError, NotADirectoryError) as error:
+            raise ConfigError(
+                f"there is no release at {store.root}; give the folder that holds {MANIFEST_NAME}"
+            ) from error
+        raise IntegrityError(f"{store.root} has no {MANIFEST_NAME}, so the release is unfinished; run `wsm pack` again")
+    return parse_manifest(store.read(MANIFEST_NAME), f"{store.root}/{MANIFEST_NAME}")
+
+
+def checked_file(store: Store, name: str, sha256: str) -> bytes:
+    """Read a whole file and compare its digest.
+
+    Raises:
+        IntegrityError: it is missing or was changed.
+    """
+    try:
+        data = store.read(name)
+    except FileNotFoundError as error:
+        raise IntegrityError(f"{store.root}/{name} is missing; fetch it again") from error
+    found = sha256_bytes(data)
+    if found != sha256:
+        raise IntegrityError(f"{store.root}/{name} must have sha256 {sha256}, found {found}; fetch it again")
+    return data

@@ -1,0 +1,80 @@
+"""Fragments put one after the other: a shard."""
+
+import hashlib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import xxhash
+
+from wsm_data.errors import IntegrityError
+from wsm_data.files.atomic import atomic_file
+from wsm_data.shards.fragment import FragmentInfo, read_fragment_info
+from wsm_data.shards.manifest import ShardInfo
+from wsm_data.shards.plan import PlannedClip, ShardPlan
+from wsm_data.shards.tar_format import END_OF_ARCHIVE
+
+_COPY_BYTES = 4 << 20
+
+
+def write_shard(path: Path, plan: ShardPlan, path_of: Callable[[str], Path]) -> ShardInfo:
+    """Write the shard of a plan at `path`, atomically, in constant memory.
+
+    Every fragment is compared with the size and digest in its sidecar while it is copied, so that what was damaged
+    since it was encoded does not get into a release.
+
+    Args:
+        path: where the shard goes; its name must be that of the plan.
+        plan: the clips and their order.
+        path_of: path of a fragment by the key of its clip.
+
+    Raises:
+        IntegrityError: names the clip whose fragment is missing or disagrees with its sidecar or with the plan.
+        ValueError: the file name is not the plan's.
+    """
+    if path.name != plan.name:
+        raise ValueError(f"the shard {plan.name} must be written under its own name, found {path.name}")
+    digest = hashlib.sha256()
+    size = 0
+    with atomic_file(path) as file:
+        for clip in plan.clips:
+            for block in _checked_blocks(path_of(clip.key), clip):
+                file.write(block)
+                digest.update(block)
+                size += len(block)
+        file.write(END_OF_ARCHIVE)
+        digest.update(END_OF_ARCHIVE)
+    return ShardInfo(
+        name=plan.name,
+        split=plan.split,
+        clips=len(plan.clips),
+        bytes=size + len(END_OF_ARCHIVE),
+        sha256=digest.hexdigest(),
+    )
+
+
+def _checked_blocks(path: Path, clip: PlannedClip) -> Iterator[bytes]:
+    info = read_fragment_info(path)
+    _require_planned(path, info, clip)
+    digest = xxhash.xxh3_128()
+    size = 0
+    try:
+        with path.open("rb") as file:
+            while block := file.read(_COPY_BYTES):
+                digest.update(block)
+                size += len(block)
+                yield block
+    except FileNotFoundError as error:
+        raise IntegrityError(f"clip {clip.key}: its fragment {path} is missing; encode it again") from error
+    if (size, digest.hexdigest()) != (info.size_bytes, info.digest):
+        raise IntegrityError(
+            f"clip {clip.key}: its fragment {path} must have {info.size_bytes} bytes and digest {info.digest}, found "
+            f"{size} bytes and {digest.hexdigest()}; encode it again"
+        )
+
+
+def _require_planned(path: Path, info: FragmentInfo, clip: PlannedClip) -> None:
+    if (info.key, info.size_bytes) != (clip.key, clip.size_bytes):
+        raise IntegrityError(
+            f"clip {clip.key}: the plan expects a fragment of {clip.size_bytes} bytes, but {path} holds {info.key} "
+            f"with {info.size_bytes} bytes; it was encoded again since, so plan again"
+        )
