@@ -1,0 +1,253 @@
+"""Any-angle geodesic distance to the goal region over a grid of robot positions.
+
+A path runs from cell centre to cell centre along straight lines of sight (strict supercover, `sight.py`): the shortest
+one is what is stored, not a walk of eight-neighbour steps (4.8 % too long) and not a solution of the eikonal equation
+(0.4 %). A taut path turns only where it bends around a convex corner of the blocked area, so Dijkstra's algorithm runs
+over the cells at such corners alone. Each of them, when it is final, sweeps the wedge behind its corner, which its
+predecessor could not see (`sight.sweep_octant`), and lowers all distances there in one pass.
+
+On a lattice the best turn may lie one cell further from the corner than the cells at it; what that leaves is measured
+by bench/geodesic.py against the graph of all mutually visible cells.
+"""
+
+import heapq
+import math
+
+import numpy as np
+from numba import njit
+
+from wsm_data.maps.footprint import traversable_cells
+from wsm_data.maps.sight import clip_slopes, segment_is_clear, sweep_octant
+from wsm_data.schema.arrays import BoolArray, Float32Array, Float64Array, Uint8Array, require_array
+from wsm_data.schema.occupancy import FREE, OccupancyGrid
+
+_SLACK_CELLS = 0.5
+_REACH_PER_RADIUS = math.sqrt(2)
+"""A free cell in a right-angled corner of walls is up to sqrt(2) radii away from the nearest traversable one."""
+
+
+def geodesic_distance(
+    grid: OccupancyGrid, goal_xy_m: Float64Array, robot_radius_m: float, goal_radius_m: float
+) -> Float32Array:
+    """Distance D(x) of a disc-shaped robot to the goal region, for every cell of a map.
+
+    Only FREE cells have a distance: what is unknown is not driven through.
+
+    Args:
+        grid: the map.
+        goal_xy_m: centre of the goal region in the world, m; [2].
+        robot_radius_m: radius of the footprint, m.
+        goal_radius_m: radius r_g of the goal region, m.
+
+    Returns:
+        float32 [Y, X], m; see `geodesic_field`.
+    """
+    column, row = grid.fractional_cells(np.asarray(goal_xy_m, np.float64))
+    return geodesic_field(
+        traversable_cells(grid, robot_radius_m),
+        grid.cells != FREE,
+        (float(column), float(row)),
+        grid.resolution_m,
+        goal_radius_m,
+        _REACH_PER_RADIUS * robot_radius_m,
+    )
+
+
+def geodesic_field(
+    traversable: BoolArray,
+    blocked: BoolArray,
+    goal_column_row: tuple[float, float],
+    resolution_m: float,
+    goal_radius_m: float,
+    reach_m: float,
+) -> Float32Array:
+    """Length of the shortest path through traversable cells to the goal region, for every cell.
+
+    The goal region is the geodesic ball of radius r_g around the goal, so D = max(0, d - r_g) with d the distance to
+    the goal itself. A cell that is neither traversable nor blocked (free, but nearer to an obstacle than the footprint
+    allows; experts drive there now and then) takes the best traversable cell that it sees within `reach_m`, plus the
+    straight way to it; nothing is propagated through such cells, so a gap that is too narrow stays closed. A
+    goal in such a place is connected likewise, and cells there that see the goal within `reach_m` go straight to it.
+
+    Args:
+        traversable: where the robot's centre may be; bool [Y, X].
+        blocked: cells without a distance, through which nothing is seen (occupied and unknown); bool [Y, X].
+        goal_column_row: the goal in fractional cells, where whole numbers are cell centres.
+        resolution_m: side of a cell, m.
+        goal_radius_m: radius r_g of the goal region, m.
+        reach_m: how far a cell beside an obstacle looks for a traversable one, m.
+
+    Returns:
+        float32 [Y, X], m; infinite where blocked or unreachable. All infinite if the goal is blocked or off the map.
+
+    Raises:
+        ValueError: the arrays differ in shape, or a cell is both traversable and blocked.
+    """
+    require_array("traversable", traversable, np.bool_, (None, None))
+    require_array("blocked", blocked, np.bool_, traversable.shape)
+    if (traversable & blocked).any():
+        raise ValueError(f"{int((traversable & blocked).sum())} cells are both traversable and blocked")
+    rows, columns = traversable.shape
+    x, y = goal_column_row[0] + 0.5, goal_column_row[1] + 0.5
+    if not (0 <= x < columns and 0 <= y < rows) or blocked[int(y), int(x)]:
+        return np.full(traversable.shape, np.inf, np.float32)
+    opaque = np.pad(~traversable, 1, constant_values=True)
+    walls = np.pad(blocked, 1, constant_values=True)
+    distance = _solve(opaque, walls, _turning_corners(opaque), x + 1, y + 1, reach_m / resolution_m)
+    return np.maximum(distance[1:-1, 1:-1] * resolution_m - goal_radius_m, 0.0).astype(np.float32)
+
+
+@njit(cache=True)
+def _turning_corners(opaque: BoolArray) -> Uint8Array:
+    """For each cell of [Y, X] the corners of it around which a path can bend; uint8 [Y, X].
+
+    Bits 1, 2, 4, 8 are the corners (left, lower), (right, lower), (left, upper), (right, upper); a bit is set in a
+    traversable cell where exactly one of the four cells that meet in the corner is opaque.
+    """
+    turns = np.zeros(opaque.shape, np.uint8)
+    for row in range(1, opaque.shape[0]):
+        for column in range(1, opaque.shape[1]):
+            a, b = opaque[row - 1, column - 1], opaque[row - 1, column]
+            c, d = opaque[row, column - 1], opaque[row, column]
+            if int(a) + int(b) + int(c) + int(d) == 1:
+                turns[row - 1, column - 1] |= 0 if a else 8
+                turns[row - 1, column] |= 0 if b else 4
+                turns[row, column - 1] |= 0 if c else 2
+                turns[row, column] |= 0 if d else 1
+    return turns
+
+
+@njit(cache=True)
+def _bend(turns: int, dx: float, dy: float, side: float) -> tuple[float, float]:
+    """The farthest direction into which a path that arrives along (dx, dy) can bend around a corner of its cell.
+
+    Args:
+        turns: corners of the cell, see `_turning_corners`.
+        dx: direction of arrival.
+        dy: direction of arrival.
+        side: 1 for bends to the right (clockwise where x goes right and y up), -1 for bends to the left.
+
+    Returns:
+        The direction from the cell's centre to that corner, (0, 0) if there is none on this side.
+    """
+    ex, ey = 0.0, 0.0
+    for corner in range(4):
+        if turns >> corner & 1:
+            wx, wy = (corner & 1) - 0.5, (corner >> 1) - 0.5
+            if side * (dx * wy - dy * wx) < 0.0 and (ex == ey == 0.0 or side * (ex * wy - ey * wx) < 0.0):
+                ex, ey = wx, wy
+    return ex, ey
+
+
+@njit(cache=True)
+def _sweep_wedge(
+    opaque: BoolArray,
+    turns: Uint8Array,
+    distance: Float64Array,
+    parent: Float64Array,
+    queue: list[tuple[float, int]],
+    cones: Float64Array,
+    source: tuple[float, float, float],
+    wedge: tuple[float, float, float, float, float],
+) -> None:
+    """Sweep the directions between (dx, dy) and (ex, ey) from a source: wedge is (side, dx, dy, ex, ey).
+
+    Side 1 goes clockwise from (dx, dy), -1 the other way, over less than half a turn; side 0 is the full circle.
+    """
+    side, dx, dy, ex, ey = wedge
+    rows, columns = opaque.shape
+    for octant in range(8):
+        sign_x, sign_y, steep = 1 - 2 * (octant & 1), 1 - (octant & 2), octant >> 2
+        fx, fy = (0.0, float(sign_y)) if steep else (float(sign_x), 0.0)
+        sx, sy = (float(sign_x), 0.0) if steep else (0.0, float(sign_y))
+        lo, hi = clip_slopes(0.0, 1.0, side * (dx * fy - dy * fx) - (side == 0.0), side * (dx * sy - dy * sx))
+        lo, hi = clip_slopes(lo, hi, side * (fx * ey - fy * ex) - (side == 0.0), side * (sx * ey - sy * ex))
+        if lo >= hi:
+            continue
+        x = source[0] if sign_x > 0 else columns - source[0]
+        y = source[1] if sign_y > 0 else rows - source[1]
+        origin = (0 if sign_x > 0 else columns - 1) + (0 if sign_y > 0 else (rows - 1) * columns)
+        step_x, step_y = sign_x, sign_y * columns
+        frame = (origin, step_x, step_y, x, y) if steep else (origin, step_y, step_x, y, x)
+        sweep_octant(
+            opaque.ravel(), turns.ravel(), distance.ravel(), parent, queue, cones, source, frame, (lo, hi), _SLACK_CELLS
+        )
+
+
+@njit(cache=True)
+def _start(
+    opaque: BoolArray, walls: BoolArray, distance: Float64Array, x: float, y: float, reach: float
+) -> list[tuple[float, int]]:
+    """Queue the cells from which everything starts: those in sight of a goal that is itself not traversable."""
+    queue = [(0.0, 0)]
+    queue.clear()
+    rows, columns = opaque.shape
+    for row in range(max(0, int(y - reach)), min(rows, int(y + reach) + 1)):
+        for column in range(max(0, int(x - reach)), min(columns, int(x + reach) + 1)):
+            straight = math.sqrt((column + 0.5 - x) ** 2 + (row + 0.5 - y) ** 2)
+            if not opaque[row, column] and straight <= reach:
+                if segment_is_clear(walls, x, y, column + 0.5, row + 0.5):
+                    distance[row, column] = straight
+                    heapq.heappush(queue, (straight, row * columns + column))
+    return queue
+
+
+@njit(cache=True)
+def _solve(
+    opaque: BoolArray, walls: BoolArray, turns: Uint8Array, x: float, y: float, reach: float
+) -> Float64Array:
+    """Distances in cells, float64 [Y, X], of padded arrays; `turns` as of `_turning_corners`, goal at (x, y)."""
+    rows, columns = opaque.shape
+    distance = np.full(opaque.shape, np.inf)
+    parent = np.full((opaque.size, 2), np.nan)
+    cones = np.empty((2, max(rows, columns) + 2, 2))
+    done = np.zeros(opaque.size, np.bool_)
+    everywhere = (0.0, 0.0, 0.0, 0.0, 0.0)
+    queue = [(0.0, 0)]
+    queue.clear()
+    if opaque[int(y), int(x)]:
+        queue = _start(opaque, walls, distance, x, y, reach)
+    else:
+        distance[int(y), int(x)] = math.sqrt((int(x) + 0.5 - x) ** 2 + (int(y) + 0.5 - y) ** 2)
+        _sweep_wedge(opaque, turns, distance, parent, queue, cones, (x, y, 0.0), everywhere)
+    while len(queue) > 0:
+        value, cell = heapq.heappop(queue)
+        if done[cell] or value > distance[cell // columns, cell % columns]:
+            continue
+        done[cell] = True
+        source = (cell % columns + 0.5, cell // columns + 0.5, value)
+        if math.isnan(parent[cell, 0]):
+            _sweep_wedge(opaque, turns, distance, parent, queue, cones, source, everywhere)
+            continue
+        dx, dy = source[0] - parent[cell, 0], source[1] - parent[cell, 1]
+        for side in (1.0, -1.0):
+            ex, ey = _bend(turns[cell // columns, cell % columns], dx, dy, side)
+            if ex != 0.0:
+                _sweep_wedge(opaque, turns, distance, parent, queue, cones, source, (side, dx, dy, ex, ey))
+    _reach_into_bands(opaque, walls, distance, x, y, reach)
+    return distance
+
+
+@njit(cache=True)
+def _reach_into_bands(
+    opaque: BoolArray, walls: BoolArray, distance: Float64Array, x: float, y: float, reach: float
+) -> None:
+    """Give cells that are neither opaque walls nor traversable the best way over a cell in sight; in place."""
+    rows, columns = opaque.shape
+    limit = int(reach)
+    for row in range(1, rows - 1):
+        for column in range(1, columns - 1):
+            if not opaque[row, column] or walls[row, column]:
+                continue
+            best = math.sqrt((column + 0.5 - x) ** 2 + (row + 0.5 - y) ** 2)
+            if best > reach or not segment_is_clear(walls, x, y, column + 0.5, row + 0.5):
+                best = np.inf
+            for i in range(max(1, row - limit), min(rows - 1, row + limit + 1)):
+                for j in range(max(1, column - limit), min(columns - 1, column + limit + 1)):
+                    if opaque[i, j] or distance[i, j] >= best:
+                        continue
+                    straight = math.sqrt((i - row) ** 2 + (j - column) ** 2)
+                    if straight <= reach and distance[i, j] + straight < best:
+                        if segment_is_clear(walls, column + 0.5, row + 0.5, j + 0.5, i + 0.5):
+                            best = distance[i, j] + straight
+            distance[row, column] = best

@@ -1,0 +1,135 @@
+"""What can be seen of a grid from a point: cones of rays that are swept over the cells, and single segments.
+
+Positions are continuous (x, y) in cells: cell (row, column) is the square [column, column + 1] x [row, row + 1] and its
+centre is (column + 1/2, row + 1/2). The line-of-sight rule of the whole package is the strict supercover: two points see
+each other if the segment between them touches no opaque square, not even at a corner. So nothing is seen through
+the point where two opaque cells meet diagonally.
+"""
+
+import heapq
+import math
+
+import numpy as np
+from numba import njit
+
+from wsm_data.schema.arrays import BoolArray, Float64Array, Uint8Array
+
+_EDGE = 1e-9
+"""Widens an octant over its own border rays (slopes 0 and 1), and closes the ends of rows in `segment_is_clear`, cells.
+Slopes that a map's corners and centres can form differ by 1 / cells^2, a million times as much."""
+
+
+@njit(cache=True)
+def clip_slopes(lo: float, hi: float, offset: float, gradient: float) -> tuple[float, float]:
+    """Cut the slopes [lo, hi] to where offset + slope * gradient <= 0; the cut is empty where lo >= hi."""
+    if gradient > 0.0:
+        return lo, min(hi, -offset / gradient)
+    if gradient < 0.0:
+        return max(lo, -offset / gradient), hi
+    return (lo, hi) if offset < 0.0 else (0.0, 0.0)
+
+
+@njit(cache=True)
+def _narrow(cones: Float64Array, count: int, lo: float, hi: float, seen: bool, kept: bool, cut: Float64Array) -> int:
+    """Append the cone (lo, hi) of a row's stretch of sight, cut to the rays that can still improve something."""
+    if kept:
+        lo, hi = max(lo, cut[0]), min(hi, cut[1])
+    if lo < hi and (kept or not seen):
+        cones[count, 0], cones[count, 1] = lo, hi
+        count += 1
+    return count
+
+
+@njit(cache=True)
+def sweep_octant(  # one loop over rows, cones and cells: the heart of the field's speed, not worth cutting up
+    opaque: BoolArray,
+    turns: Uint8Array,
+    distance: Float64Array,
+    parent: Float64Array,
+    queue: list[tuple[float, int]],
+    cones: Float64Array,
+    source: tuple[float, float, float],
+    frame: tuple[int, int, int, float, float],
+    slopes: tuple[float, float],
+    slack: float,
+) -> None:
+    """Lower the distance of every cell centre that a source sees inside a cone of one octant.
+
+    The sweep goes away from the source row by row. A cone (lo, hi) holds the slopes (side over forward) that are
+    still open; an opaque cell takes the slopes between its two outer corners out of it. Rays along which every centre
+    is already reached by a path shorter by `slack` are dropped: by the triangle inequality the other path
+    stays the shorter one all along the rest of the ray.
+
+    Args:
+        opaque: bool [cells], flat, with an opaque border all around, which ends every sweep.
+        turns: uint8 [cells]; cells that are not zero are queued when their distance falls.
+        distance: float64 [cells] in cells, lowered in place.
+        parent: float64 [cells, 2], position of the last turn before a queued cell, written in place.
+        queue: heap of (distance, cell), pushed to in place.
+        cones: float64 [2, n, 2] workspace, n above the longer side of the map.
+        source: its (x, y) and distance, in cells.
+        frame: flat index of the octant's cell (0, 0), steps to the next cell sideways and forward, and the source's
+            sideways and forward coordinate.
+        slopes: the open cone, within [0, 1].
+        slack: see above, in cells.
+    """
+    origin, step_side, step_forward, side0, forward0 = frame
+    cut = np.empty(2)
+    now, after = cones[0], cones[1]
+    now[0, 0] = slopes[0] if slopes[0] > 0.0 else -_EDGE
+    now[0, 1] = slopes[1] if slopes[1] < 1.0 else 1.0 + _EDGE
+    count = 1
+    row = int(math.floor(forward0))
+    while count > 0:
+        near, middle, far = row - forward0, row + 0.5 - forward0, row + 1 - forward0
+        following = 0
+        for i in range(count):
+            lo, hi = now[i, 0], now[i, 1]
+            cut[0], cut[1] = lo, hi
+            seen = kept = False
+            last = int(math.floor(side0 + hi * far))
+            for column in range(int(math.floor(side0 + lo * max(near, 0.0))), last + 1):
+                cell = origin + column * step_side + row * step_forward
+                if opaque[cell]:
+                    following = _narrow(after, following, lo, min(hi, (column - side0) / far), seen, kept, cut)
+                    lo = max(lo, (column + 1 - side0) / near) if near > 0.0 else hi
+                    if lo >= hi:
+                        break
+                    cut[0], cut[1] = lo, hi
+                    seen = kept = False
+                elif middle > 0.0:
+                    side = column + 0.5 - side0
+                    slope = side / middle
+                    if lo < slope < hi:
+                        seen = True
+                        value = source[2] + math.sqrt(side * side + middle * middle)
+                        if value < distance[cell] + slack:
+                            kept, cut[1] = True, hi
+                            if value < distance[cell]:
+                                distance[cell] = value
+                                if turns[cell]:
+                                    parent[cell, 0], parent[cell, 1] = source[0], source[1]
+                                    heapq.heappush(queue, (value, cell))
+                        elif not kept:
+                            cut[0] = slope
+                        elif cut[1] == hi:
+                            cut[1] = slope
+            else:
+                following = _narrow(after, following, lo, hi, seen, kept, cut)
+        now, after, count = after, now, following
+        row += 1
+
+
+@njit(cache=True)
+def segment_is_clear(opaque: BoolArray, x0: float, y0: float, x1: float, y1: float) -> bool:
+    """Whether two points of a grid see each other; opaque is bool [Y, X] and both points lie inside it."""
+    if x0 > x1:
+        x0, y0, x1, y1 = x1, y1, x0, y0
+    gradient = (y1 - y0) / (x1 - x0) if x1 > x0 else 0.0
+    for column in range(int(math.floor(x0 - _EDGE)), int(math.floor(x1 + _EDGE)) + 1):
+        enter = y0 + (max(float(column), x0) - x0) * gradient
+        leave = y0 + (min(column + 1.0, x1) - x0) * gradient if x1 > x0 else y1
+        for row in range(int(math.floor(min(enter, leave) - _EDGE)), int(math.floor(max(enter, leave) + _EDGE)) + 1):
+            if opaque[row, column]:
+                return False
+    return True
