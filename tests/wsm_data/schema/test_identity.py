@@ -8,7 +8,7 @@ import tarfile
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from webdataset.tariterators import group_by_keys, tar_file_iterator
+from webdataset.tariterators import group_by_keys, tar_file_expander
 
 from wsm_data.schema.identity import EpisodeId
 
@@ -64,7 +64,7 @@ def test_stock_webdataset_reads_the_key_back(tmp_path, scene):
         for member in ("poses.npy", "meta.json"):
             archive.addfile(tarfile.TarInfo(f"{key}.{member}"), io.BytesIO())
     with (tmp_path / "a.tar").open("rb") as file:  # WebDataset(path) is made of these two, but leaves the file open
-        (sample,) = group_by_keys(tar_file_iterator(file))
+        (sample,) = group_by_keys(tar_file_expander([{"url": "a.tar", "stream": file}]))
     assert sample["__key__"] == key
     assert {"poses.npy", "meta.json"} < set(sample)
 
