@@ -3,7 +3,7 @@
 import fcntl
 import json
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +15,8 @@ from wsm_data.files.atomic import write_text
 from wsm_data.files.jsonlines import append_line, drop_torn_line, read_lines, write_lines
 from wsm_data.schema.verdict import Refusal
 
-STAGE_FILE, LEDGER_FILE, QUARANTINE_FILE = "stage.json", "ledger.jsonl", "quarantine.jsonl"
+STAGE_FILE, LEDGER_FILE = "stage.json", "ledger.jsonl"
+QUARANTINE_FILE, PENDING_FILE = "quarantine.jsonl", "pending.jsonl"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,6 +38,7 @@ class StageRecord:
         config: the whole resolved config, input paths included.
         fingerprint: digest of name, version and settings.
         inputs: fingerprint of each upstream stage, by the config field that names it.
+        seen: `finished` of each upstream stage when this one was last finished, by the same names.
         units: number of units in the listing.
         workers: worker processes of the last run.
         finished: digest of the outcomes `finish` was last called with; empty before.
@@ -48,6 +50,7 @@ class StageRecord:
     config: Mapping[str, Any]
     fingerprint: str
     inputs: Mapping[str, str]
+    seen: Mapping[str, str]
     units: int = 0
     workers: int = 1
     finished: str = ""
@@ -85,8 +88,34 @@ def read_ledger(folder: Path) -> dict[str, LedgerEntry]:
 
 def append_ledger(folder: Path, entry: LedgerEntry) -> None:
     """Add the outcome of one unit; on disk when the call returns."""
+    append_line(folder / LEDGER_FILE, {**_ledger_line(entry), "time": round(time.time(), 3)})
+
+
+def compact_ledger(folder: Path, entries: Mapping[str, LedgerEntry]) -> None:
+    """Keep only the given entries, and delete the files that only others wrote: units that left the source.
+
+    Lines keep their text, times included; a ledger that holds nothing else is left alone.
+    """
+    lines = list(read_lines(folder / LEDGER_FILE))
+    last = {str(line["unit"]): line for line in lines}
+    kept = {unit: line for unit, line in last.items() if unit in entries and line["key"] == entries[unit].key}
+    if len(kept) == len(lines):
+        return
+    wanted = {output for line in kept.values() for output in _outputs(line)}
+    for line in lines:
+        for output in _outputs(line):
+            if output not in wanted and (folder / output).is_file():
+                (folder / output).unlink()
+    write_lines(folder / LEDGER_FILE, kept.values())
+
+
+def _outputs(line: Mapping[str, Any]) -> Sequence[str]:
+    return tuple(line["outputs"])
+
+
+def _ledger_line(entry: LedgerEntry) -> dict[str, Any]:
     outcome = entry.outcome
-    line = {
+    return {
         "unit": outcome.unit,
         "key": entry.key,
         "state": outcome.state,
@@ -95,9 +124,7 @@ def append_ledger(folder: Path, entry: LedgerEntry) -> None:
         "facts": dict(outcome.facts),
         "refusals": [refusal_json(refusal) for refusal in outcome.refusals],
         "seconds": round(outcome.seconds, 4),
-        "time": round(time.time(), 3),
     }
-    append_line(folder / LEDGER_FILE, line)
 
 
 def write_quarantine(folder: Path, record: StageRecord, refusals: Iterable[Refusal]) -> None:

@@ -21,14 +21,14 @@ class StageEntry:
 
 
 STAGES: tuple[StageEntry, ...] = (
-    StageEntry(name="synth", summary="Generate homes and expert trajectories in the layout of InternData-N1."),
-    StageEntry(name="index", summary="Find the trajectories of a source, check them, and digest every frame."),
-    StageEntry(name="split", summary="Deal trajectories, or whole scenes, to training and test by a hash."),
-    StageEntry(name="map", summary="Build the map of every scene from its point cloud or from fused depth."),
-    StageEntry(name="encode", summary="Turn trajectories into clips: latents, poses, map crops, geodesic fields."),
-    StageEntry(name="pack", summary="Pack clips into a release: shards, index, statistics, manifest last."),
-    StageEntry(name="verify", summary="Prove that a release is whole: every byte, every clip, every trajectory."),
-    StageEntry(name="report", summary="Write one HTML file with pictures that shows what is in a release."),
+    StageEntry(name="synth", summary="Generate homes and expert trajectories on disk."),
+    StageEntry(name="index", summary="Find, check and digest the trajectories of a source."),
+    StageEntry(name="split", summary="Deal trajectories or scenes to training and test."),
+    StageEntry(name="map", summary="Build the map of every scene."),
+    StageEntry(name="encode", summary="Turn trajectories into clips of latents and poses."),
+    StageEntry(name="pack", summary="Pack clips into a release of indexed shards."),
+    StageEntry(name="verify", summary="Prove that a release is whole, or name the damage."),
+    StageEntry(name="report", summary="Show a release in one HTML file with pictures."),
 )
 
 

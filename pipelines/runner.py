@@ -5,7 +5,7 @@ import fnmatch
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -15,10 +15,12 @@ from tqdm import tqdm
 from pipelines.config import config_json, differences, settings_of
 from pipelines.engines.local import run_local
 from pipelines.folder import (
+    PENDING_FILE,
     QUARANTINE_FILE,
     LedgerEntry,
     StageRecord,
     append_ledger,
+    compact_ledger,
     locked,
     read_ledger,
     read_stage_record,
@@ -27,9 +29,11 @@ from pipelines.folder import (
 )
 from pipelines.report import StageReport, stage_report
 from pipelines.stage import REFUSED, Outcome, Settled, Stage, StageContext, Unit, refused
+from pipelines.upstream import upstream_records
 from wsm_data.errors import BudgetExceeded, ConfigError, DataError, WsmError
 from wsm_data.files.atomic import remove_temporaries
 from wsm_data.files.digest import digest_json
+from wsm_data.files.jsonlines import write_lines
 from wsm_data.schema.verdict import Refusal
 
 Engine = Callable[[Sequence[Any], Callable[[Any], Iterator[Any]], int], Iterator[Any]]
@@ -147,19 +151,11 @@ def _record(stage: Stage[Any], config: Any, units: int, workers: int) -> StageRe
         settings=settings,
         config=config_json(config),
         fingerprint=digest_json({"name": stage.name, "version": stage.version, "settings": settings}),
-        inputs={name: upstream.fingerprint for name, upstream in _upstream(config).items()},
+        inputs={name: upstream.fingerprint for name, upstream in upstream_records(config).items()},
+        seen={name: upstream.finished for name, upstream in upstream_records(config).items()},
         units=units,
         workers=workers,
     )
-
-
-def _upstream(config: Any) -> dict[str, StageRecord]:
-    """Records of the stages a config takes its inputs from, by field."""
-    folders = {
-        one.name: Path(getattr(config, one.name)) for one in fields(config) if one.metadata.get("role") == "input"
-    }
-    records = {name: read_stage_record(folder) for name, folder in folders.items()}
-    return {name: record for name, record in records.items() if record is not None}
 
 
 def _choose_folder(out: Path, record: StageRecord, fork: bool) -> Path:
@@ -275,12 +271,14 @@ def _finish(job: _Job, finished: str) -> None:
                 for unit, one in settled.outcomes.items()
             ),
             list(settled.pending),
-            {name: upstream.finished for name, upstream in _upstream(job.config).items()},
+            dict(job.record.seen),
         ]
     )
     if state != finished:
         extra = job.stage.finish(job.config, StageContext(out=job.out), settled) if job.stage.finish else ()
         _write_refusals(job, extra)
+        compact_ledger(job.out, {unit: job.ledger[unit] for unit in settled.outcomes})
+        write_lines(job.out / PENDING_FILE, [{"unit": unit} for unit in settled.pending])
     write_stage_record(job.out, replace(job.record, finished=state))
 
 

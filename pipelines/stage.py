@@ -87,7 +87,6 @@ class Stage(Generic[ConfigT]):
     Attributes:
         name: name of the command and of the folder in a run.
         version: raised when the bytes written change.
-        summary: one line for the command's help.
         config_type: keyword-only frozen dataclass of its settings.
         list_units: all units of the inputs, in a stable order.
         process: works on the units of one batch and yields an outcome each; a `DataError` that escapes refuses the
@@ -98,7 +97,6 @@ class Stage(Generic[ConfigT]):
 
     name: str
     version: int
-    summary: str
     config_type: type[ConfigT]
     list_units: Callable[[ConfigT], Sequence[Unit]]
     process: Callable[[Sequence[Unit], ConfigT, StageContext], Iterator[Outcome]]

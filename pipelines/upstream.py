@@ -1,20 +1,36 @@
-"""How a stage reads the one before it: through its record and ledger, never by listing files."""
+"""How a stage reads the ones before it: through their records and ledgers, never by listing files."""
 
 from collections.abc import Mapping
+from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
-from pipelines.folder import QUARANTINE_FILE, StageRecord, read_ledger, read_stage_record, refusal_from_json
+from pipelines.folder import (
+    PENDING_FILE,
+    QUARANTINE_FILE,
+    StageRecord,
+    read_ledger,
+    read_stage_record,
+    refusal_from_json,
+)
 from pipelines.stage import DONE, Outcome
 from wsm_data.errors import ConfigError
 from wsm_data.files.jsonlines import read_lines
 from wsm_data.schema.verdict import Refusal
 
 
+def upstream_records(config: Any) -> dict[str, StageRecord]:
+    """Records of the stages a config takes its inputs from, by the field that names the folder."""
+    names = [one.name for one in fields(config) if one.metadata.get("role") == "input"]
+    records = {name: read_stage_record(Path(getattr(config, name))) for name in names}
+    return {name: record for name, record in records.items() if record is not None}
+
+
 def require_stage(folder: Path, name: str) -> StageRecord:
-    """The record of an upstream stage whose last run came to its end.
+    """The record of an upstream stage that has come to its end and is not older than its own inputs.
 
     Raises:
-        ConfigError: the folder holds no output of that stage, or one that was cut short before it was finished.
+        ConfigError: the folder holds no output of that stage, one that was cut short, or one that is out of date.
     """
     record = read_stage_record(folder)
     if record is None or record.name != name:
@@ -22,6 +38,10 @@ def require_stage(folder: Path, name: str) -> StageRecord:
         raise ConfigError(f"{folder} must hold the output of `wsm {name}`, found {found}; run `wsm {name}` first")
     if not record.finished:
         raise ConfigError(f"`wsm {name}` has not come to its end in {folder}; run the same command again to resume it")
+    for field, seen in record.seen.items():
+        upstream = read_stage_record(Path(record.config[field]))
+        if upstream is not None and upstream.finished != seen:
+            raise ConfigError(f"{folder} is older than its input {record.config[field]}; run `wsm {name}` again")
     return record
 
 
@@ -34,3 +54,8 @@ def done_outcomes(folder: Path) -> Mapping[str, Outcome]:
 def quarantine_of(folder: Path) -> tuple[Refusal, ...]:
     """Every refusal an upstream stage wrote down."""
     return tuple(refusal_from_json(line) for line in read_lines(folder / QUARANTINE_FILE))
+
+
+def pending_units(folder: Path) -> tuple[str, ...]:
+    """Ids of the units that an upstream stage was not asked to work on, or did not come to."""
+    return tuple(str(line["unit"]) for line in read_lines(folder / PENDING_FILE))

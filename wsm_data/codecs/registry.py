@@ -1,13 +1,11 @@
 """The codecs by name, and the settings that choose one."""
 
 import difflib
-import importlib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from wsm_data.codecs.base import VideoCodec
-from wsm_data.codecs.dct import DctCodec
 from wsm_data.errors import ConfigError
 
 
@@ -29,10 +27,10 @@ class CodecConfig:
     """
 
     name: str = "dct"
-    weights: str = ""
+    weights: str = field(default="", metadata={"role": "input"})
     dtype: str = "float32"
-    device: str = "auto"
-    batch_clips: int = 1
+    device: str = field(default="auto", metadata={"role": "speed"})
+    batch_clips: int = field(default=1, metadata={"role": "speed"})
 
     def __post_init__(self) -> None:
         if self.batch_clips < 1:
@@ -59,16 +57,19 @@ def _make_dct(config: CodecConfig) -> VideoCodec:
             "codec dct has no weights and computes in float32 on the CPU, found "
             f"weights = {config.weights!r}, dtype = {config.dtype!r}, device = {config.device!r}; drop them or take wan"
         )
+    from wsm_data.codecs.dct import DctCodec  # it imports numba: programs that only read settings need not wait
+
     return DctCodec()
 
 
 def _make_wan(config: CodecConfig) -> VideoCodec:
-    # Loaded by name: this codec imports torch and diffusers, which nobody who uses dct should wait for or need.
-    module = importlib.import_module("wsm_data.codecs.wan")
-    codec: VideoCodec = module.load_wan_codec(
-        config.weights, dtype=config.dtype, device=config.device, batch_clips=config.batch_clips
-    )
-    return codec
+    try:
+        from wsm_data.codecs.wan import load_wan_codec  # it imports torch and diffusers, which dct does not need
+    except ModuleNotFoundError as error:
+        raise ConfigError(
+            f"codec wan needs the package {error.name}; install the extra: pip install 'wsm[wan]'"
+        ) from error
+    return load_wan_codec(config.weights, dtype=config.dtype, device=config.device, batch_clips=config.batch_clips)
 
 
 _MAKERS: Mapping[str, Callable[[CodecConfig], VideoCodec]] = MappingProxyType({"dct": _make_dct, "wan": _make_wan})

@@ -1,0 +1,155 @@
+"""`wsm`: one command per stage, all with the same options, and commands that run them in order or look at a release."""
+
+import errno
+import importlib
+import inspect
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from pipelines.registry import STAGES, StageEntry
+from wsm_data.errors import WsmError
+
+_INTERRUPTED_EXIT_CODE = 130
+
+
+class _Commands(TyperGroup):
+    """Turns foreseen errors into one message and their exit code; anything else keeps its traceback."""
+
+    def invoke(self, ctx: Any) -> Any:
+        try:
+            return super().invoke(ctx)
+        except WsmError as error:
+            _fail(str(error), error.exit_code)
+        except KeyboardInterrupt:
+            _fail("interrupted; run the same command again to go on where it stopped", _INTERRUPTED_EXIT_CODE)
+        except OSError as error:
+            if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+                raise
+            _fail(f"the disk is full ({error}); free space and run the same command again", 1)
+
+
+app = typer.Typer(
+    cls=_Commands,
+    help="From navigation trajectories to a verified release of shards for the World SLAM Model.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+_OPTIONS: dict[str, tuple[Any, Any]] = {
+    "out": (
+        Annotated[Path, typer.Option("--out", "-o", help="Folder to write; what is done there is kept.")],
+        inspect.Parameter.empty,
+    ),
+    "config": (
+        Annotated[Path | None, typer.Option("--config", "-c", help="TOML of differences, with a section per stage.")],
+        None,
+    ),
+    "assignments": (
+        Annotated[
+            list[str] | None,
+            typer.Option("--set", "-s", help="One setting: key=value or section.key=value. Repeatable."),
+        ],
+        None,
+    ),
+    "workers": (Annotated[int, typer.Option("--workers", "-w", min=0, help="Worker processes; 0: one a core.")], 0),
+    "limit": (Annotated[int, typer.Option("--limit", min=0, help="At most this many pending units; 0: all.")], 0),
+    "only": (
+        Annotated[
+            list[str] | None, typer.Option("--only", help="Only units whose id matches, as 'gibson_*/*'. Repeatable.")
+        ],
+        None,
+    ),
+    "dry_run": (
+        Annotated[bool, typer.Option("--dry-run", help="Show settings and what would be done; write nothing.")],
+        False,
+    ),
+    "max_refused": (
+        Annotated[
+            float,
+            typer.Option("--max-refused", min=0, help="Stop when more units are refused: share below 1, or number."),
+        ],
+        0.1,
+    ),
+    "fork": (
+        Annotated[bool, typer.Option("--fork", help="With changed settings, write beside --out instead of stopping.")],
+        False,
+    ),
+    "retry_refused": (
+        Annotated[bool, typer.Option("--retry-refused", help="Try again what was refused before.")],
+        False,
+    ),
+    "quiet": (Annotated[bool, typer.Option("--quiet", "-q", help="No progress bars.")], False),
+}
+"""The options of every command that runs stages: annotation and default. They stand here, and only here."""
+
+ReleaseArgument = Annotated[str, typer.Argument(metavar="RELEASE", help="Folder or URL of a release.")]
+
+
+def _command(name: str, summary: str, call: Callable[..., None], **arguments: Any) -> None:
+    """Register a command that takes `arguments` (annotations by name) and then all of `_OPTIONS`."""
+    parameters = [
+        *(inspect.Parameter(one, inspect.Parameter.KEYWORD_ONLY, annotation=kind) for one, kind in arguments.items()),
+        *(
+            inspect.Parameter(one, inspect.Parameter.KEYWORD_ONLY, annotation=kind, default=default)
+            for one, (kind, default) in _OPTIONS.items()
+        ),
+    ]
+
+    def command(**values: Any) -> None:
+        call(**values)
+
+    command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    command.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+    app.command(name, help=summary)(command)
+
+
+def _load(module: str) -> Any:
+    """A command's module, loaded when the command runs: `wsm --help` needs neither numpy nor OpenCV."""
+    return importlib.import_module(f"pipelines.commands.{module}")
+
+
+def _fail(message: str, code: int) -> None:
+    typer.echo(f"error: {message}", err=True)
+    sys.exit(code)
+
+
+def _add_stage_command(entry: StageEntry) -> None:
+    _command(entry.name, entry.summary, lambda **options: _load("stages").run_one(entry.name, **options))
+
+
+for _entry in STAGES:
+    _add_stage_command(_entry)
+
+_command(
+    "run",
+    "Run the stages of a recipe into one run folder.",
+    lambda **values: _load("stages").run_recipe(**values),
+    recipe=Annotated[str, typer.Argument(metavar="RECIPE", help="Name of a recipe, or path of a TOML file.")],
+)
+_command(
+    "demo",
+    "The main job, end to end, on generated data.",
+    lambda **values: _load("stages").run_recipe(recipe="demo", **values),
+)
+
+
+@app.command("inspect")
+def inspect_release(
+    release: ReleaseArgument,
+    key: Annotated[
+        str | None, typer.Argument(metavar="[KEY]", help="One clip: its key or the id of its trajectory.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="Contact sheet to write; default: KEY.png here.")
+    ] = None,
+    limit: Annotated[int, typer.Option("--limit", min=0, help="Clips to list; 0: all.")] = 20,
+) -> None:
+    """List a release, or show one clip and draw it."""
+    _load("inspect").inspect_release(release, key, out, limit)

@@ -1,0 +1,79 @@
+"""`wsm STAGE`, `wsm run` and `wsm demo`: build configs, run stages, print what came of it."""
+
+import json
+import logging
+import os
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import typer
+
+from pipelines.config import build_config, config_json, load_toml, merge, parse_assignments
+from pipelines.recipe import Recipe, load_recipe, stage_config
+from pipelines.registry import load_stage
+from pipelines.report import StageReport, summary_table
+from pipelines.runner import RunOptions, run_stage
+from wsm_data.errors import ConfigError
+from wsm_data.files.digest import digest_json
+
+
+def run_one(name: str, out: Path, config: Path | None, assignments: Sequence[str] | None, **options: Any) -> None:
+    """Run one stage with settings from its section of a TOML file and from `--set`."""
+    stage = load_stage(name)
+    values = load_toml(config).get(name, {}) if config else {}
+    built = build_config(stage.config_type, merge(values, parse_assignments(assignments or ())), "")
+    report = _run(name, built, out, _options(options))
+    typer.echo(summary_table([report]))
+
+
+def run_recipe(recipe: str, out: Path, config: Path | None, assignments: Sequence[str] | None, **options: Any) -> None:
+    """Run the stages of a recipe into `out`, each in a folder of its own, and say where the results are."""
+    loaded = load_recipe(recipe, config, parse_assignments(assignments or ()))
+    run_options = _options(options)
+    out = _fork(loaded, out) if run_options.fork else out
+    run_options = replace(run_options, fork=False)
+    reports: list[StageReport] = []
+    for position, name in enumerate(loaded.stages):
+        first = position == 0
+        if run_options.dry_run and not _inputs_exist(loaded, name, out):
+            typer.echo(f"{name}: will be planned when the stages before it have run")
+            continue
+        built = stage_config(loaded, name, out)
+        chosen = run_options if first else replace(run_options, limit=0, only=())
+        reports.append(_run(name, built, out / name, chosen))
+    typer.echo(summary_table(reports))
+    for label, path in (("release", out / "pack" / "release"), ("report", out / "report" / "report.html")):
+        if path.exists():
+            typer.echo(f"{label}: {path}")
+
+
+def _run(name: str, config: Any, out: Path, options: RunOptions) -> StageReport:
+    if options.dry_run:
+        typer.echo(f"{name}: settings\n{json.dumps(config_json(config), indent=2)}")
+    report = run_stage(load_stage(name), config, out, options)
+    if options.dry_run:
+        for unit in report.ran:
+            typer.echo(f"{name}: would do {unit}")
+    return report
+
+
+def _options(values: dict[str, Any]) -> RunOptions:
+    logging.basicConfig(format="%(levelname)s %(message)s", level=logging.WARNING)
+    workers = values.pop("workers") or os.cpu_count() or 1
+    only = tuple(values.pop("only") or ())
+    return RunOptions(workers=workers, only=only, **values)
+
+
+def _fork(recipe: Recipe, out: Path) -> Path:
+    digest = digest_json({"stages": recipe.stages, "settings": recipe.settings, "source": recipe.source})
+    return out.with_name(f"{out.name}-{digest[:8]}") if out.exists() else out
+
+
+def _inputs_exist(recipe: Recipe, name: str, out: Path) -> bool:
+    try:
+        load_stage(name).list_units(stage_config(recipe, name, out))
+    except ConfigError:
+        return False
+    return True

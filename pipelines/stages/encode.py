@@ -1,0 +1,209 @@
+"""`wsm encode`: trajectories into clips, one sequential pass over every archive and folder."""
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from wsm_data.maps.scene_map import SceneMap, load_scene_map
+
+from pipelines.clip_builder import (
+    ClipConfig,
+    ClipVideos,
+    Provenance,
+    SceneView,
+    build_clip,
+    measure_quality,
+    read_videos,
+    view_scene,
+)
+from pipelines.config import INPUT
+from pipelines.episode_table import read_episodes
+from pipelines.layout import clips_folder, codec_path, map_path, records_path
+from pipelines.source import IndexedSource, container_from_json, conventions_digest, indexed_source
+from pipelines.stage import Outcome, Settled, Stage, StageContext, Unit, refused
+from pipelines.upstream import done_outcomes, quarantine_of, require_stage
+from wsm_data.codecs.base import VideoCodec
+from wsm_data.codecs.registry import CodecConfig, make_codec
+from wsm_data.errors import DataError
+from wsm_data.files.atomic import write_text
+from wsm_data.files.digest import sha256_bytes
+from wsm_data.readers.containers import Container
+from wsm_data.readers.frames import iter_episode_frames
+from wsm_data.readers.record_table import read_records
+from wsm_data.schema.arrays import Float32Array
+from wsm_data.schema.episode import EpisodeRecord
+from wsm_data.schema.verdict import Refusal
+from wsm_data.shards.fragment import build_fragment, write_fragment
+
+
+@dataclass(frozen=True, kw_only=True)
+class EncodeConfig:
+    """Settings of `wsm encode`.
+
+    Attributes:
+        index: folder of `wsm index`.
+        map: folder of `wsm map`.
+        clip: what a clip holds.
+        codec: which codec encodes.
+        quality_share: share of the clips, chosen by a hash of their ids, that are decoded again to measure the codec.
+    """
+
+    index: Path = field(metadata=INPUT)
+    map: Path = field(metadata=INPUT)
+    clip: ClipConfig = field(default_factory=ClipConfig)
+    codec: CodecConfig = field(default_factory=CodecConfig)
+    quality_share: float = 0.05
+
+
+@dataclass(frozen=True, kw_only=True)
+class _SceneInput:
+    """What the worker of one container needs beside the container; it pickles."""
+
+    container: Container
+    map_digest: str
+    map_from: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Prepared:
+    """A trajectory that waits for the codec."""
+
+    unit: Unit
+    record: EpisodeRecord
+    view: SceneView
+    videos: ClipVideos
+
+
+def _list_units(config: EncodeConfig) -> Sequence[Unit]:
+    require_stage(config.map, "map")
+    source = indexed_source(config.index)
+    codec = make_codec(config.codec).describe().digest
+    conventions = conventions_digest(source.dataset)
+    containers = done_outcomes(config.index)
+    maps = done_outcomes(config.map)
+    refused_maps = {refusal.unit: refusal for refusal in quarantine_of(config.map)}
+    units = []
+    for row in read_episodes(config.index):
+        facts = containers[row.container].facts
+        mapped = maps.get(row.container)
+        without = refused_maps.get(row.container)
+        if mapped is None and without is None:
+            continue  # its map is pending, and so is the trajectory
+        units.append(
+            Unit(
+                id=row.id.text,
+                source=row.container,
+                inputs={
+                    "trajectory": row.digest,
+                    "map": mapped.digest if mapped else f"refused {without.reason}" if without else "",
+                    "codec": codec,
+                    "dataset": conventions,
+                },
+                batch=row.container,
+                payload=without
+                or _SceneInput(
+                    container=container_from_json(facts["container"]),
+                    map_digest=facts["surface"],
+                    map_from="depth" if mapped and mapped.facts["fused_from_depth"] else "cloud",
+                ),
+            )
+        )
+    return units
+
+
+def _process(batch: Sequence[Unit], config: EncodeConfig, context: StageContext) -> Iterator[Outcome]:
+    scene = batch[0].payload
+    if not isinstance(scene, _SceneInput):
+        for unit in batch:
+            message = f"the scene of {unit.id} has no map: {scene.message}"
+            yield refused(unit, DataError(scene.reason, message, scene.details))
+        return
+    source = indexed_source(config.index)
+    codec = make_codec(config.codec)
+    scene_map = load_scene_map(map_path(config.map, scene.container.id))
+    waiting: list[_Prepared] = []
+    for prepared in _prepare(batch, scene, source, scene_map, config):
+        if isinstance(prepared, Outcome):
+            yield prepared
+            continue
+        waiting.append(prepared)
+        if len(waiting) == config.codec.batch_clips:
+            yield from _encode(waiting, scene, source, codec, config, context.out)
+            waiting = []
+    yield from _encode(waiting, scene, source, codec, config, context.out)
+
+
+def _prepare(
+    batch: Sequence[Unit], scene: _SceneInput, source: IndexedSource, scene_map: SceneMap, config: EncodeConfig
+) -> Iterator[_Prepared | Outcome]:
+    """Read the trajectories of one container in one pass, on the map and as videos; the unusable come as outcomes."""
+    units = {unit.id: unit for unit in batch}
+    records = [one for one in read_records(records_path(config.index, scene.container.id)) if one.id.text in units]
+    for record, frames in iter_episode_frames(source.root, scene.container, records):
+        unit = units[record.id.text]
+        try:
+            view = view_scene(record, scene_map, source.dataset, config.clip)
+            yield _Prepared(
+                unit=unit, record=record, view=view, videos=read_videos(record, frames, source.dataset, config.clip)
+            )
+        except DataError as error:
+            yield refused(unit, error)
+
+
+def _encode(
+    waiting: Sequence[_Prepared],
+    scene: _SceneInput,
+    source: IndexedSource,
+    codec: VideoCodec,
+    config: EncodeConfig,
+    out: Path,
+) -> Iterator[Outcome]:
+    latents = codec.encode_many([video for one in waiting for video in (one.videos.rgb, one.videos.depth)])
+    info = codec.describe()
+    provenance = Provenance(
+        dataset=source.dataset,
+        map_digest=scene.map_digest,
+        map_from=scene.map_from,
+        codec=info.name,
+        codec_digest=info.digest,
+    )
+    for number, one in enumerate(waiting):
+        pair = latents[2 * number], latents[2 * number + 1]
+        clip = build_clip(one.record, one.view, one.videos, pair, provenance, config.clip)
+        fragment = build_fragment(clip)
+        path = write_fragment(clips_folder(out), fragment)
+        quality = _quality(one, pair, codec, config)
+        facts: dict[str, Any] = {
+            "frames": one.record.frame_count,
+            "bytes": fragment.info.size_bytes,
+            "source_digest": one.record.content_digest,
+            "quality": quality,
+        }
+        outputs = (path, path.with_suffix(".json"))
+        yield Outcome(
+            unit=one.unit.id,
+            digest=fragment.info.digest,
+            outputs=tuple(str(each.relative_to(out)) for each in outputs),
+            facts=facts,
+        )
+
+
+def _quality(
+    one: _Prepared, latents: tuple[Float32Array, Float32Array], codec: VideoCodec, config: EncodeConfig
+) -> dict[str, Any] | None:
+    rank = int(sha256_bytes(one.unit.id.encode())[:8], 16) / 16**8
+    return measure_quality(one.videos, latents, codec, config.clip).to_json() if rank < config.quality_share else None
+
+
+def _finish(config: EncodeConfig, context: StageContext, settled: Settled) -> Sequence[Refusal]:
+    """Write what the codec says of itself beside the clips, for the release."""
+    del settled
+    write_text(codec_path(context.out), json.dumps(asdict(make_codec(config.codec).describe()), indent=2) + "\n")
+    return ()
+
+
+STAGE = Stage(
+    name="encode", version=1, config_type=EncodeConfig, list_units=_list_units, process=_process, finish=_finish
+)

@@ -1,0 +1,180 @@
+"""`wsm index`: one sequential pass over every archive and folder of a source."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from wsm_data.checks.record import check_record
+from wsm_data.maps.voxels import save_voxels, voxels_digest, voxels_from_cloud, voxels_from_depth
+
+from pipelines.config import INPUT
+from pipelines.depth_fusion import fused_points
+from pipelines.episode_table import EpisodeRow, write_episodes
+from pipelines.folder import refusal_json
+from pipelines.layout import records_path, surface_path
+from pipelines.source import container_json, conventions_digest
+from pipelines.stage import DONE, Outcome, Settled, Stage, StageContext, Unit, refused
+from wsm_data.errors import DataError, Reason
+from wsm_data.files.digest import digest_json, sha256_file
+from wsm_data.readers.containers import Container, find_containers
+from wsm_data.readers.manifest import load_dataset
+from wsm_data.readers.record_table import write_records
+from wsm_data.readers.scan import ContainerScan, scan_container
+from wsm_data.schema.dataset import DatasetManifest
+from wsm_data.schema.episode import EpisodeRecord
+from wsm_data.schema.identity import EpisodeId
+from wsm_data.schema.verdict import Refusal
+
+
+@dataclass(frozen=True, kw_only=True)
+class IndexConfig:
+    """Settings of `wsm index`.
+
+    Attributes:
+        source: root of the source tree: groups, with scene archives, scene folders or trajectory folders in them.
+        dataset: manifest with the source's conventions: a name under manifests/datasets/, or a TOML file.
+        depth_sample_every: where a scene has no cloud, every n-th depth frame is fused into its map.
+    """
+
+    source: Path = field(metadata=INPUT)
+    dataset: str = "interndata_n1"
+    depth_sample_every: int = 10
+
+
+def _list_units(config: IndexConfig) -> Sequence[Unit]:
+    dataset = load_dataset(config.dataset)
+    conventions = conventions_digest(dataset)
+    return [
+        Unit(
+            id=container.id,
+            source=container.id,
+            inputs={"files": container.signature, "dataset": conventions},
+            payload=container,
+        )
+        for container in find_containers(config.source, dataset)
+    ]
+
+
+def _process(batch: Sequence[Unit], config: IndexConfig, context: StageContext) -> Iterator[Outcome]:
+    dataset = load_dataset(config.dataset)
+    for unit in batch:
+        try:
+            yield _index_container(unit, unit.payload, config, dataset, context.out)
+        except DataError as error:
+            yield refused(unit, error)
+
+
+def _index_container(
+    unit: Unit, container: Container, config: IndexConfig, dataset: DatasetManifest, out: Path
+) -> Outcome:
+    scan = scan_container(config.source, container, dataset, config.depth_sample_every)
+    kept, refusals = _checked(scan, dataset)
+    records = records_path(out, container.id)
+    records.parent.mkdir(parents=True, exist_ok=True)
+    write_records(records, kept)
+    surface, cloud_refusal = _write_surface(scan, kept, dataset, surface_path(out, container.id))
+    rows = [_row(record) for record in kept]
+    facts = {
+        "frames": sum(record.frame_count for record in kept),
+        "trajectories": len(kept),
+        "container": container_json(container),
+        "episodes": rows,
+        "surface": surface,
+        "cloud_refusal": cloud_refusal and refusal_json(cloud_refusal),
+        "bytes": scan.bytes_read,
+        "notes": {record.id.text: list(record.notes) for record in kept if record.notes},
+    }
+    outputs = [records, *([surface_path(out, container.id)] if surface else [])]
+    return Outcome(
+        unit=unit.id,
+        digest=digest_json([sha256_file(records), surface, facts["cloud_refusal"]]),
+        outputs=tuple(str(path.relative_to(out)) for path in outputs),
+        facts=facts,
+        refusals=tuple(refusals),
+    )
+
+
+def _checked(scan: ContainerScan, dataset: DatasetManifest) -> tuple[list[EpisodeRecord], list[Refusal]]:
+    """Records that pass every check, and the refusals of the others, the reader's own included."""
+    kept, refusals = [], list(scan.refusals)
+    for record in scan.records:
+        failed = next((verdict for verdict in check_record(record, dataset) if verdict.reason is not None), None)
+        if failed is None or failed.reason is None:
+            kept.append(record)
+            continue
+        refusals.append(
+            Refusal(
+                unit=record.id.text,
+                source=record.container,
+                reason=failed.reason,
+                message=failed.message,
+                details=failed.measured,
+            )
+        )
+    return kept, refusals
+
+
+def _write_surface(
+    scan: ContainerScan, records: Sequence[EpisodeRecord], dataset: DatasetManifest, path: Path
+) -> tuple[str, Refusal | None]:
+    """Write the scene's surface; returns its digest, or the empty text and the reason why there is none."""
+    if scan.cloud_refusal is not None:
+        return "", scan.cloud_refusal
+    try:
+        if scan.cloud is not None:
+            voxels = voxels_from_cloud(scan.cloud, dataset.cloud)
+        else:
+            voxels = voxels_from_depth(fused_points(records, scan.depth_samples, dataset.depth))
+    except DataError as error:
+        container = records[0].container if records else ""
+        return "", Refusal.from_error(container, container, error)
+    save_voxels(path, voxels)
+    return voxels_digest(voxels), None
+
+
+def _row(record: EpisodeRecord) -> dict[str, Any]:
+    return {
+        "id": record.id.text,
+        "container": record.container,
+        "digest": record.content_digest,
+        "frames": record.frame_count,
+        "floor_z_m": record.floor_z_m,
+    }
+
+
+def _finish(config: IndexConfig, context: StageContext, settled: Settled) -> Sequence[Refusal]:
+    """Write the table of trajectories; of those found twice the first container's stays, the others are refused."""
+    del config
+    first: dict[str, Mapping[str, Any]] = {}
+    refusals = []
+    for container, outcome in sorted(settled.outcomes.items()):
+        for row in outcome.facts.get("episodes", ()) if outcome.state == DONE else ():
+            kept = first.setdefault(row["id"], row)
+            if kept is not row:
+                refusals.append(_duplicate(container, row, kept))
+    write_episodes(context.out, [EpisodeRow(**{**row, "id": EpisodeId.parse(row["id"])}) for row in first.values()])
+    return refusals
+
+
+def _duplicate(container: str, row: Mapping[str, Any], kept: Mapping[str, Any]) -> Refusal:
+    same = row["digest"] == kept["digest"]
+    content = "the same content" if same else "other content"
+    return Refusal(
+        unit=f"{row['id']}@{container}",
+        source=container,
+        reason=Reason.EPISODE_DUPLICATE,
+        message=f"{row['id']} stands in {kept['container']} too, with {content}; the one in {container} is left out: "
+        "remove one of them, or rename the trajectory",
+        details={"kept_in": kept["container"], "same_content": same},
+    )
+
+
+STAGE = Stage(
+    name="index",
+    version=1,
+    config_type=IndexConfig,
+    list_units=_list_units,
+    process=_process,
+    finish=_finish,
+)

@@ -1,0 +1,93 @@
+"""`wsm map`: what a robot can and cannot drive over, for every scene and floor."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+from pathlib import Path
+from typing import Any
+
+from wsm_data.maps.scene_map import build_scene_map, floor_levels, save_scene_map, scene_map_digest
+from wsm_data.maps.voxels import load_voxels
+
+from pipelines.config import INPUT
+from pipelines.folder import refusal_from_json
+from pipelines.layout import map_path, surface_path
+from pipelines.source import conventions_digest, indexed_source
+from pipelines.stage import Outcome, Stage, StageContext, Unit, refused
+from pipelines.upstream import done_outcomes
+from wsm_data.errors import DataError, Reason
+from wsm_data.files.digest import digest_json
+
+
+class WithoutCloud(StrEnum):
+    """What becomes of a scene without a point cloud."""
+
+    FUSE = "fuse"
+    REFUSE = "refuse"
+
+
+@dataclass(frozen=True, kw_only=True)
+class MapConfig:
+    """Settings of `wsm map`.
+
+    Attributes:
+        index: folder of `wsm index`.
+        without_cloud: `fuse` the map from depth images and note it (cloud.missing), or `refuse` the scene.
+    """
+
+    index: Path = field(metadata=INPUT)
+    without_cloud: WithoutCloud = WithoutCloud.FUSE
+
+
+def _list_units(config: MapConfig) -> Sequence[Unit]:
+    conventions = conventions_digest(indexed_source(config.index).dataset)
+    return [
+        Unit(
+            id=container,
+            source=container,
+            inputs={
+                "surface": outcome.facts["surface"],
+                "cloud_refusal": digest_json(outcome.facts["cloud_refusal"]),
+                "floors": digest_json(_floors(outcome.facts)),
+                "dataset": conventions,
+            },
+            payload=outcome.facts,
+        )
+        for container, outcome in done_outcomes(config.index).items()
+        if outcome.facts["episodes"]
+    ]
+
+
+def _process(batch: Sequence[Unit], config: MapConfig, context: StageContext) -> Iterator[Outcome]:
+    for unit in batch:
+        try:
+            yield _map_scene(unit, config, context.out)
+        except DataError as error:
+            yield refused(unit, error)
+
+
+def _map_scene(unit: Unit, config: MapConfig, out: Path) -> Outcome:
+    if unit.payload["cloud_refusal"] is not None:
+        refusal = refusal_from_json(unit.payload["cloud_refusal"])
+        raise DataError(refusal.reason, refusal.message, refusal.details)
+    voxels = load_voxels(surface_path(config.index, unit.id))
+    if voxels.origin == "depth" and config.without_cloud is WithoutCloud.REFUSE:
+        raise DataError(
+            Reason.CLOUD_MISSING,
+            f"{unit.id} has no point cloud; add meta/pointcloud.ply, or let the map be fused from depth images with "
+            "without_cloud = fuse",
+        )
+    robot = indexed_source(config.index).dataset.robot
+    scene_map = build_scene_map(voxels, _floors(unit.payload), robot)
+    path = map_path(out, unit.id)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    save_scene_map(path, scene_map)
+    facts = {"floors": len(scene_map.levels), "fused_from_depth": int(voxels.origin == "depth")}
+    return Outcome(unit=unit.id, digest=scene_map_digest(scene_map), outputs=(str(path.relative_to(out)),), facts=facts)
+
+
+def _floors(facts: Mapping[str, Any]) -> tuple[float, ...]:
+    return floor_levels([row["floor_z_m"] for row in facts["episodes"]])
+
+
+STAGE = Stage(name="map", version=1, config_type=MapConfig, list_units=_list_units, process=_process)

@@ -1,0 +1,167 @@
+"""`wsm pack`: clips into shards, shards into a release."""
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from pipelines.config import INPUT
+from pipelines.inventory import inventory_of, run_refusals
+from pipelines.layout import clips_folder, codec_path, release_folder
+from pipelines.source import indexed_source
+from pipelines.split_table import read_split
+from pipelines.stage import Outcome, Settled, Stage, StageContext, Unit
+from pipelines.upstream import done_outcomes, pending_units, require_stage
+from wsm_data.codecs.quality import CodecQuality
+from wsm_data.errors import ConfigError
+from wsm_data.files.digest import digest_json
+from wsm_data.schema.codec import CodecInfo
+from wsm_data.schema.depth import DepthRange
+from wsm_data.schema.identity import EpisodeId
+from wsm_data.schema.verdict import Refusal
+from wsm_data.shards.assemble import ReleaseFacts, finish_release
+from wsm_data.shards.fragment import fragment_path, read_fragment_info
+from wsm_data.shards.manifest import ShardInfo
+from wsm_data.shards.names import MANIFEST_NAME
+from wsm_data.shards.plan import PlannedClip, ShardPlan, plan_shards
+from wsm_data.shards.writer import write_shard
+
+
+@dataclass(frozen=True, kw_only=True)
+class PackConfig:
+    """Settings of `wsm pack`.
+
+    Attributes:
+        index: folder of `wsm index`.
+        split: folder of `wsm split`.
+        map: folder of `wsm map`.
+        encode: folder of `wsm encode`.
+        name: name of the release.
+        shard_mib: shards are filled up to this size, MiB.
+        seed: another seed, another order of the clips.
+        partial: pack although trajectories are pending; the release says so. Not a setting of the bytes of a shard.
+    """
+
+    index: Path = field(metadata=INPUT)
+    split: Path = field(metadata=INPUT)
+    map: Path = field(metadata=INPUT)
+    encode: Path = field(metadata=INPUT)
+    name: str = "release"
+    shard_mib: int = 512
+    seed: int = 0
+    partial: bool = field(default=False, metadata={"role": "selection"})
+
+
+def _list_units(config: PackConfig) -> Sequence[Unit]:
+    for name in ("index", "split", "map", "encode"):
+        require_stage(getattr(config, name), name)
+    _require_complete(config)
+    outcomes = _clips(config)
+    splits = read_split(config.split)
+    clips = [
+        PlannedClip(key=EpisodeId.parse(name).key, split=splits[name], size_bytes=outcome.facts["bytes"])
+        for name, outcome in outcomes.items()
+    ]
+    digests = {EpisodeId.parse(name).key: outcome.digest for name, outcome in outcomes.items()}
+    plans = plan_shards(clips, shard_bytes=config.shard_mib << 20, seed=config.seed)
+    return [
+        Unit(
+            id=plan.name,
+            inputs={"clips": digest_json([[one.key, digests[one.key]] for one in plan.clips])},
+            payload=plan,
+        )
+        for plan in plans
+    ]
+
+
+def _clips(config: PackConfig) -> Mapping[str, Outcome]:
+    """Outcomes of the trajectories that became clips and still belong to the source, by id."""
+    splits = read_split(config.split)
+    clips = {name: outcome for name, outcome in done_outcomes(config.encode).items() if name in splits}
+    if not clips:
+        raise ConfigError(
+            f"{config.encode} holds no clip; `wsm encode` and the quarantine files say what became of the trajectories"
+        )
+    return clips
+
+
+def _pending(config: PackConfig) -> list[str]:
+    return [unit for folder in (config.index, config.map, config.encode) for unit in pending_units(folder)]
+
+
+def _require_complete(config: PackConfig) -> None:
+    pending = _pending(config)
+    if pending and not config.partial:
+        raise ConfigError(
+            f"{len(pending)} units are pending, such as {pending[0]}: run `wsm index`, `wsm map` and `wsm encode` to their end, or "
+            "pack what there is with --set partial=true"
+        )
+
+
+def _process(batch: Sequence[Unit], config: PackConfig, context: StageContext) -> Iterator[Outcome]:
+    release, clips = release_folder(context.out), clips_folder(config.encode)
+    for unit in batch:
+        plan: ShardPlan = unit.payload
+        (release / MANIFEST_NAME).unlink(missing_ok=True)  # a release that is being rewritten is unfinished
+        path = release / plan.name
+        shard = write_shard(path, plan, lambda key: fragment_path(clips, key))
+        facts = {"clips": shard.clips, "bytes": shard.bytes, "shard": asdict(shard)}
+        yield Outcome(unit=unit.id, digest=shard.sha256, outputs=(str(path.relative_to(context.out)),), facts=facts)
+
+
+def _finish(config: PackConfig, context: StageContext, settled: Settled) -> Sequence[Refusal]:
+    """Write index, inventory and manifest once every shard stands."""
+    if settled.pending:
+        return ()
+    plans = [unit.payload for unit in _list_units(config)]
+    clips = _clips(config)
+    folder = clips_folder(config.encode)
+    finish_release(
+        release_folder(context.out),
+        _facts(config, clips),
+        plans=plans,
+        shards=[ShardInfo(**settled.outcomes[plan.name].facts["shard"]) for plan in plans],
+        read_info=lambda key: read_fragment_info(fragment_path(folder, key)),
+        inventory=inventory_of(
+            config.index,
+            config.encode,
+            read_split(config.split),
+            {name: outcome.facts["source_digest"] for name, outcome in clips.items()},
+        ),
+        refusals=run_refusals([config.index, config.map, config.encode]),
+    )
+    return ()
+
+
+def _facts(config: PackConfig, clips: Mapping[str, Outcome]) -> ReleaseFacts:
+    records = {name: require_stage(getattr(config, name), name) for name in ("index", "split", "map", "encode")}
+    clip_settings: Mapping[str, Any] = records["encode"].settings["clip"]
+    codec = json.loads(codec_path(config.encode).read_text())
+    dataset = indexed_source(config.index).dataset
+    return ReleaseFacts(
+        name=config.name,
+        codec=CodecInfo(
+            **{**codec, "latent_mean": tuple(codec["latent_mean"]), "latent_std": tuple(codec["latent_std"])}
+        ),
+        depth_range=DepthRange(**clip_settings["depth_range"]),
+        encoded_width_px=clip_settings["width"],
+        encoded_height_px=clip_settings["height"],
+        fingerprints={name: record.fingerprint for name, record in records.items()},
+        licences={dataset.name: dataset.licence},
+        codec_quality=_quality(clips),
+        partial=bool(_pending(config)),
+    )
+
+
+def _quality(clips: Mapping[str, Outcome]) -> dict[str, Any]:
+    """Merged quality of the clips on which it was measured, in the order of their ids; empty where none was."""
+    measured = [outcome.facts["quality"] for _, outcome in sorted(clips.items()) if outcome.facts["quality"]]
+    merged: CodecQuality | None = None
+    for record in measured:
+        quality = CodecQuality.from_json(record)
+        merged = quality if merged is None else merged.merge(quality)
+    return merged.to_json() if merged else {}
+
+
+STAGE = Stage(name="pack", version=1, config_type=PackConfig, list_units=_list_units, process=_process, finish=_finish)
