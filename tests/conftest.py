@@ -1,4 +1,4 @@
-"""Settings of every property test: the same examples on every machine, and no time limits that a busy machine breaks."""
+"""Settings of every property test: the same examples everywhere, and no time limits for a busy machine to break."""
 
 from hypothesis import settings
 
