@@ -1,0 +1,94 @@
+"""The second pass over a container: the image bytes of whole episodes, each checked against the first pass."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from wsm_data.errors import DataError, IntegrityError
+from wsm_data.files.digest import xxh3_128
+from wsm_data.readers.assemble import digest_frames
+from wsm_data.readers.containers import Container, Layout
+from wsm_data.readers.members import iter_members
+from wsm_data.schema.episode import EpisodeRecord
+
+
+@dataclass(frozen=True, kw_only=True)
+class EpisodeFrames:
+    """The compressed images of an episode in time order.
+
+    Attributes:
+        rgb: T JPEG files.
+        depth: T PNG files.
+    """
+
+    rgb: tuple[bytes, ...]
+    depth: tuple[bytes, ...]
+
+
+def iter_episode_frames(
+    source: Path, container: Container, records: Sequence[EpisodeRecord]
+) -> Iterator[tuple[EpisodeRecord, EpisodeFrames]]:
+    """Yield the images of the wanted episodes of a container, each episode as soon as it is complete.
+
+    A folder gives them in the order of `records` and reads an episode only when it is asked for. An archive is read
+    once from its start, gives them in the order in which they become complete, holds the images that wait for others
+    compressed, and is left as soon as the last wanted episode is out.
+
+    Raises:
+        IntegrityError: the images are not those of the first pass: the source changed since.
+        ValueError: a record belongs to another container.
+    """
+    for record in records:
+        if record.container != container.id:
+            raise ValueError(f"{record.id.text} is in {record.container}, not in {container.id}")
+    if container.layout is Layout.SCENE_ARCHIVE:
+        yield from _from_archive(source, container, records)
+    else:
+        yield from _from_folder(source / container.path, records)
+
+
+def _from_folder(root: Path, records: Sequence[EpisodeRecord]) -> Iterator[tuple[EpisodeRecord, EpisodeFrames]]:
+    for record in records:
+        try:
+            rgb = tuple((root / name).read_bytes() for name in record.rgb_members)
+            depth = tuple((root / name).read_bytes() for name in record.depth_members)
+        except FileNotFoundError as error:
+            raise _changed(record.container, f"{error.filename} is gone") from error
+        yield record, _verified(record, EpisodeFrames(rgb=rgb, depth=depth))
+
+
+def _from_archive(
+    source: Path, container: Container, records: Sequence[EpisodeRecord]
+) -> Iterator[tuple[EpisodeRecord, EpisodeFrames]]:
+    owner = {name: record for record in records for name in (*record.rgb_members, *record.depth_members)}
+    waiting = {record.id: 2 * record.frame_count for record in records}
+    held: dict[str, bytes] = {}
+    if not waiting:
+        return
+    try:
+        for member in iter_members(source, container, owner.__contains__):
+            record = owner[member.name]
+            held[member.name] = bytes(member.data)
+            waiting[record.id] -= 1
+            if waiting[record.id] == 0:
+                del waiting[record.id]
+                rgb = tuple(held.pop(name) for name in record.rgb_members)
+                depth = tuple(held.pop(name) for name in record.depth_members)
+                yield record, _verified(record, EpisodeFrames(rgb=rgb, depth=depth))
+                if not waiting:
+                    return
+    except (DataError, FileNotFoundError) as error:
+        raise _changed(container.id, str(error)) from error
+    absent = sorted(id_.text for id_ in waiting)
+    raise _changed(container.id, f"images of {', '.join(absent[:3])} are gone ({len(absent)} episodes)")
+
+
+def _verified(record: EpisodeRecord, frames: EpisodeFrames) -> EpisodeFrames:
+    digest = digest_frames([xxh3_128(image) for image in frames.rgb], [xxh3_128(image) for image in frames.depth])
+    if digest != record.frames_digest:
+        raise _changed(record.container, f"the images of {record.id.text} have other bytes")
+    return frames
+
+
+def _changed(container: str, what: str) -> IntegrityError:
+    return IntegrityError(f"{container} changed since `wsm index` read it: {what}; run `wsm index` again")
