@@ -6,7 +6,7 @@ from typing import TypeVar
 import numpy as np
 
 from wsm_data.codecs.base import TEMPORAL_RATIO
-from wsm_data.codecs.depth import log_depth_table, valid_table
+from wsm_data.codecs.depth import is_measured, log_depth_table
 from wsm_data.codecs.images import decode_depth, decode_rgb, resize_depth, resize_rgb
 from wsm_data.errors import DataError, Reason
 from wsm_data.schema.arrays import BoolArray, Float32Array, Uint8Array, Uint16Array
@@ -60,14 +60,14 @@ def depth_video(
         DataError: FRAME_UNDECODABLE, DEPTH_NOT_16_BIT; FRAME_SIZE_MISMATCH where a frame's size differs from the
             first one's.
     """
-    normalised, is_valid = log_depth_table(encoding, depth_range), valid_table(encoding)
+    normalised = log_depth_table(encoding, depth_range)
     channel = np.empty((len(frames), height, width), np.float32)
     valid = np.empty((len(frames), height, width), bool)
     decoded = (decode_depth(data, _frame_name(where, "depth", index)) for index, data in enumerate(frames))
     for index, raw_u16 in enumerate(_of_one_size(decoded, where, "depth")):
         codes = resize_depth(raw_u16, width, height)
-        channel[index] = normalised[codes]
-        valid[index] = is_valid[codes]
+        np.take(normalised, codes, out=channel[index], mode="clip")  # every code is in the table; "raise" would buffer
+        valid[index] = is_measured(codes, encoding)
     return _three_channels(channel), valid
 
 

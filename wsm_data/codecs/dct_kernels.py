@@ -22,7 +22,7 @@ def cosine_basis(length: int) -> Float32Array:
     return basis.astype(np.float32)
 
 
-@njit(cache=True)
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def forward(
     plane: Float32Array, frequencies: Int16Array, in_time: Float32Array, in_space: Float32Array, out: Float32Array
 ) -> None:
@@ -46,7 +46,7 @@ def forward(
                 out[n, block_row, block] = total
 
 
-@njit(cache=True)
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def _project_time(plane: Float32Array, block_row: int, weights: Float32Array, rows: Float32Array) -> None:
     for i in range(SIDE):
         y = block_row * SIDE + i
@@ -57,7 +57,7 @@ def _project_time(plane: Float32Array, block_row: int, weights: Float32Array, ro
             rows[i, x] = total
 
 
-@njit(cache=True)
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def _project_rows(rows: Float32Array, weights: Float32Array, columns: Float32Array) -> None:
     columns[:] = np.float32(0)
     for i in range(SIDE):
@@ -65,7 +65,7 @@ def _project_rows(rows: Float32Array, weights: Float32Array, columns: Float32Arr
             columns[x] += weights[i] * rows[i, x]
 
 
-@njit(cache=True)
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def inverse(
     coefficients: Float32Array,
     frequencies: Int16Array,
@@ -90,14 +90,14 @@ def inverse(
             start = stop
 
 
-@njit(cache=True)
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def _spread_columns(row: Float32Array, weights: Float32Array, columns: Float32Array) -> None:
     for block in range(len(row)):
         for i in range(SIDE):
             columns[block * SIDE + i] += weights[i] * row[block]
 
 
-@njit(cache=True)
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def _spread_rows(
     columns: Float32Array, in_y: Float32Array, in_time: Float32Array, block_row: int, out: Float32Array
 ) -> None:

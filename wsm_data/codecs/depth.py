@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wsm_data.codecs.base import TEMPORAL_RATIO
-from wsm_data.schema.arrays import BoolArray, Float32Array, Float64Array, Uint8Array, require_array
+from wsm_data.schema.arrays import BoolArray, Float32Array, Float64Array, Uint8Array, Uint16Array, require_array
 from wsm_data.schema.depth import DepthEncoding, DepthRange
 
 _RAW_CODES = 1 << 16
@@ -32,11 +32,12 @@ def log_depth_table(encoding: DepthEncoding, depth_range: DepthRange) -> Float32
     return normalise_depth(depth_m, depth_range)
 
 
-def valid_table(encoding: DepthEncoding) -> BoolArray:
-    """Whether a raw code is a measurement, bool [65536]."""
-    valid = np.ones(_RAW_CODES, bool)
-    valid[list(encoding.invalid_codes)] = False
-    return valid
+def is_measured(raw_u16: Uint16Array, encoding: DepthEncoding) -> BoolArray:
+    """Whether each raw code is a measurement, in the shape of `raw_u16`."""
+    measured = np.ones(raw_u16.shape, bool)
+    for code in encoding.invalid_codes:
+        measured &= raw_u16 != code
+    return measured
 
 
 def depth_m_from_latent_video(video: Float32Array, depth_range: DepthRange) -> Float32Array:

@@ -165,8 +165,9 @@ class CodecQuality:
     @classmethod
     def from_json(cls, record: Mapping[str, Any]) -> "CodecQuality":
         """Inverse of `to_json`."""
-        depth = {name: tuple(value) if isinstance(value, list) else value for name, value in record["depth"].items()}
-        return cls(**{**record, "depth": DepthErrors(**depth)})
+        depth = record["depth"]
+        tuples = {name: tuple(depth[name]) for name in ("edges_m", "error_sum_m", "counts")}
+        return cls(**{**record, "depth": DepthErrors(**{**depth, **tuples})})
 
 
 def clip_quality(reference: Float32Array, decoded: Float32Array, depth: DepthErrors) -> CodecQuality:

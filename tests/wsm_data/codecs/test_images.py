@@ -1,0 +1,114 @@
+from fractions import Fraction
+from math import floor
+
+import cv2
+import numpy as np
+import pytest
+import simplejpeg
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from wsm_data.codecs.images import decode_depth, decode_rgb, resize_depth, resize_rgb
+from wsm_data.errors import DataError, Reason
+
+WHERE = "gibson_d435i/Adrian/000003, frame 7"
+
+
+def refusal(decode, data):
+    with pytest.raises(DataError) as caught:
+        decode(data, WHERE)
+    assert WHERE in caught.value.message
+    return caught.value.reason
+
+
+def test_colours_come_back_in_the_order_red_green_blue():
+    image = np.full((32, 32, 3), (200, 40, 90), np.uint8)
+    decoded = decode_rgb(simplejpeg.encode_jpeg(image, quality=100, colorsubsampling="444"), WHERE)
+    assert decoded.dtype == np.uint8
+    assert np.abs(decoded.astype(int) - image).max() <= 2  # JPEG's own rounding at quality 100
+
+
+def test_a_grey_jpeg_has_three_equal_channels():
+    data = simplejpeg.encode_jpeg(np.full((16, 16, 1), 77, np.uint8), colorspace="GRAY")
+    assert (decode_rgb(data, WHERE) == 77).all()
+
+
+@pytest.mark.parametrize("share", [0.0, 0.01, 0.3, 0.9])
+def test_a_cut_jpeg_is_refused_and_not_half_grey(rgb_frames, share):
+    data = rgb_frames[0]
+    assert refusal(decode_rgb, data[: int(share * len(data))]) is Reason.FRAME_UNDECODABLE
+
+
+def test_a_jpeg_without_its_end_marker_is_refused(rgb_frames):
+    assert refusal(decode_rgb, rgb_frames[0][:-2]) is Reason.FRAME_UNDECODABLE
+
+
+def test_a_jpeg_whose_entropy_data_is_overwritten_is_refused(rgb_frames):
+    data = bytearray(rgb_frames[0])
+    middle = len(data) // 2
+    data[middle : middle + 200] = bytes(200)
+    # OpenCV accepts these bytes with a warning on its own stream: the reason this decoder is strict.
+    assert cv2.imdecode(np.frombuffer(bytes(data), np.uint8), cv2.IMREAD_COLOR) is not None
+    assert refusal(decode_rgb, bytes(data)) is Reason.FRAME_UNDECODABLE
+
+
+def test_a_png_is_no_colour_frame(depth_frames):
+    assert refusal(decode_rgb, depth_frames[0]) is Reason.FRAME_UNDECODABLE
+
+
+def test_depth_comes_back_to_the_bit(depth_frames, depth_images):
+    decoded = decode_depth(depth_frames[1], WHERE)
+    assert decoded.dtype == np.uint16
+    assert np.array_equal(decoded, depth_images[1])
+
+
+@pytest.mark.parametrize("share", [0.0, 0.001, 0.3, 0.999])
+def test_a_cut_depth_png_is_refused(depth_frames, share):
+    data = depth_frames[0]
+    assert refusal(decode_depth, data[: int(share * len(data))]) is Reason.FRAME_UNDECODABLE
+
+
+def test_a_changed_byte_in_a_depth_png_is_refused(depth_frames):
+    data = bytearray(depth_frames[0])
+    data[len(data) // 2] ^= 0xFF
+    assert refusal(decode_depth, bytes(data)) is Reason.FRAME_UNDECODABLE
+
+
+@pytest.mark.parametrize(
+    "image",
+    [np.zeros((8, 8), np.uint8), np.zeros((8, 8, 3), np.uint8), np.zeros((8, 8, 3), np.uint16)],
+    ids=["8-bit grey", "8-bit colour", "16-bit colour"],
+)
+def test_a_png_that_is_not_16_bit_grey_is_refused_as_such(image):
+    assert refusal(decode_depth, cv2.imencode(".png", image)[1].tobytes()) is Reason.DEPTH_NOT_16_BIT
+
+
+def test_colour_is_averaged_over_areas():
+    image = np.arange(4 * 6 * 3, dtype=np.uint8).reshape(4, 6, 3)
+    wanted = np.rint(image.reshape(2, 2, 3, 2, 3).mean(axis=(1, 3)) + 1e-9)
+    assert np.abs(resize_rgb(image, 3, 2) - wanted).max() <= 1  # halves may go either way
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    source=st.tuples(st.integers(1, 70), st.integers(1, 70)), target=st.tuples(st.integers(1, 50), st.integers(1, 50))
+)
+def test_depth_takes_the_pixel_in_which_the_centre_lies(source, target):
+    def picked(before, after):
+        return [floor((i + Fraction(1, 2)) * Fraction(before, after)) for i in range(after)]
+
+    raw = np.random.default_rng(0).integers(0, 65536, source).astype(np.uint16)
+    resized = resize_depth(raw, target[1], target[0])
+    assert np.array_equal(resized, raw[np.ix_(picked(source[0], target[0]), picked(source[1], target[1]))])
+
+
+@pytest.mark.parametrize("size", [(480, 270), (640, 360)])
+def test_the_sizes_of_the_source_are_aligned_at_pixel_centres(size):
+    width, height = size
+    columns = np.broadcast_to(np.arange(width, dtype=np.uint16), (height, width)).copy()
+    wanted = np.floor((np.arange(320) + 0.5) * width / 320)
+    assert np.array_equal(resize_depth(columns, 320, 192)[0], wanted)
+
+
+def test_no_value_comes_out_that_did_not_go_in(depth_images):
+    assert set(np.unique(resize_depth(depth_images[0], 32, 32))) <= set(np.unique(depth_images[0]))
