@@ -42,6 +42,7 @@ def write_index(path: Path, table: pa.Table) -> None:
         pq.write_table(
             table.combine_chunks(),
             file,
+            write_page_checksum=True,
             row_group_size=_ROW_GROUP_ROWS,
             compression={name: "zstd" if name in texts else "none" for name in SCHEMA.names},
             use_dictionary=list(REPEATED_COLUMNS),
@@ -62,9 +63,9 @@ class IndexTable:
     def __len__(self) -> int:
         return int(self.table.num_rows)
 
-    def keys(self) -> list[str]:
-        """Keys of all clips, in the order of the shards."""
-        return list(self.table["key"].to_pylist())
+    def texts(self, column: str) -> list[str]:
+        """A text column, such as `key`, in the order of the shards."""
+        return list(self.table[column].to_pylist())
 
     def numbers(self, column: str) -> np.ndarray:
         """An integer column as an array [rows]."""
@@ -128,7 +129,7 @@ def parse_index(data: bytes, where: str, columns: Sequence[str] | None = None) -
         IntegrityError: it is not an index of this version.
     """
     try:
-        file = pq.ParquetFile(pa.BufferReader(data))
+        file = pq.ParquetFile(pa.BufferReader(data), page_checksum_verification=True)
         metadata = file.schema_arrow.metadata or {}
         if metadata.get(b"wsm.index_version") != INDEX_VERSION.encode():
             raise ValueError(f"wsm.index_version must be {INDEX_VERSION}; use a matching wsm")

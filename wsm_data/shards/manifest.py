@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any
 
 from wsm_data.errors import IntegrityError
-from wsm_data.files.digest import sha256_bytes
+from wsm_data.files.digest import digest_json, sha256_bytes
 from wsm_data.schema.codec import CodecInfo
 from wsm_data.schema.depth import DepthRange
 from wsm_data.shards.statistics import LatentStatistics
@@ -93,8 +93,13 @@ class ReleaseManifest:
 
 
 def manifest_bytes(manifest: ReleaseManifest) -> bytes:
-    """The one spelling of dataset.json: sorted keys, two spaces, a newline at the end."""
-    text = json.dumps(_plain(manifest), sort_keys=True, indent=2, ensure_ascii=False, allow_nan=False)
+    """The one spelling of dataset.json: sorted keys, two spaces, a newline at the end.
+
+    `content_sha256` is the digest of all the other fields in canonical JSON: a changed byte anywhere contradicts it.
+    """
+    record = {item.name: _plain(getattr(manifest, item.name)) for item in fields(manifest)}
+    record["content_sha256"] = digest_json(record)
+    text = json.dumps(record, sort_keys=True, indent=2, ensure_ascii=False, allow_nan=False)
     return text.encode() + b"\n"
 
 
@@ -120,7 +125,7 @@ def parse_manifest(data: bytes, where: str) -> ReleaseManifest:
             raise ValueError(f"schema_version must be {RELEASE_SCHEMA_VERSION}, found {version!r}; use a matching wsm")
         manifest = _from_json(record)
         if manifest_bytes(manifest) != data:
-            raise ValueError("it is spelled differently from how it was written; restore the file")
+            raise ValueError("it was changed since it was written; restore the file")
     except (ValueError, TypeError, KeyError) as error:
         raise IntegrityError(f"{where} must be the manifest of a release, but: {error}") from error
     return manifest
@@ -137,7 +142,8 @@ def _from_json(record: Mapping[str, Any]) -> ReleaseManifest:
         "depth_statistics": _statistics(record["depth_statistics"]),
         "depth_range": DepthRange(**record["depth_range"]),
     }
-    return ReleaseManifest(**{**record, **parsed})
+    others = {name: value for name, value in record.items() if name != "content_sha256"}
+    return ReleaseManifest(**{**others, **parsed})
 
 
 def _statistics(record: Mapping[str, Any]) -> LatentStatistics:
