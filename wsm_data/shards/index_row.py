@@ -171,6 +171,17 @@ def parse_row(record: Mapping[str, Any]) -> IndexRow:
     Raises:
         IntegrityError: the members do not stand where those of a clip of this key and shape stand.
     """
+    try:
+        row = _row(record)
+    except (ValueError, TypeError) as error:  # a length below zero, an empty cell
+        raise _contradiction(record) from error
+    end = row.members[-1].end_offset
+    if row_record(row) != record or end != row.clip_offset + row.clip_size:
+        raise _contradiction(record)
+    return row
+
+
+def _row(record: Mapping[str, Any]) -> IndexRow:
     axes = {axis: record[column] for axis, column in AXIS_COLUMNS.items()}
     members = lay_out(
         record["key"],
@@ -179,17 +190,17 @@ def parse_row(record: Mapping[str, Any]) -> IndexRow:
         checksums={name: f"{record[f'{name}_checksum']:016x}" for name in MEMBER_NAMES},
         start=record["clip_offset"],
     )
-    row = IndexRow(
+    return IndexRow(
         **{name: record[name] for name in (*UNIQUE_COLUMNS, *REPEATED_COLUMNS, "position", "padded_frames")},
         clip_offset=record["clip_offset"],
         clip_size=record["clip_size"],
         members=members,
         axes=axes,
     )
-    end = members[-1].end_offset
-    if row_record(row) != record or end != row.clip_offset + row.clip_size:
-        raise IntegrityError(
-            f"{row.shard}, clip {row.key}: its row in {INDEX_NAME} places members where clips of this shape do "
-            "not have them; restore the index"
-        )
-    return row
+
+
+def _contradiction(record: Mapping[str, Any]) -> IntegrityError:
+    return IntegrityError(
+        f"{record['shard']}, clip {record['key']}: its row in {INDEX_NAME} places members where clips of this key and "
+        "shape do not have them; restore the index"
+    )

@@ -13,6 +13,7 @@ import pyarrow.parquet as pq
 from wsm_data.errors import IntegrityError
 from wsm_data.files.atomic import atomic_file, write_bytes
 from wsm_data.files.jsonlines import canonical_json
+from wsm_data.schema.identity import EpisodeId
 
 _TIME_FIELDS = ("time", "seconds")
 _SCHEMA = pa.schema(
@@ -64,13 +65,17 @@ class InventoryRow:
             raise ValueError(
                 f"{self.unit}: a refusal has a reason and nothing else, found {self.reason!r}, {self.state}"
             )
+        if self.state == UnitState.CLIP:
+            EpisodeId.parse(self.unit)
 
 
 def write_inventory(path: Path, rows: Iterable[InventoryRow]) -> None:
     """Write the inventory atomically, sorted by unit."""
     records = [asdict(row) for row in sorted(rows, key=lambda row: (row.unit, row.container, row.state, row.reason))]
     with atomic_file(path) as file:
-        pq.write_table(pa.Table.from_pylist(records, schema=_SCHEMA), file, compression="zstd")
+        pq.write_table(
+            pa.Table.from_pylist(records, schema=_SCHEMA), file, compression="zstd", write_page_checksum=True
+        )
 
 
 def parse_inventory(data: bytes, where: str) -> tuple[InventoryRow, ...]:
@@ -80,7 +85,7 @@ def parse_inventory(data: bytes, where: str) -> tuple[InventoryRow, ...]:
         IntegrityError: it is not an inventory.
     """
     try:
-        table = pq.read_table(pa.BufferReader(data))
+        table = pq.read_table(pa.BufferReader(data), page_checksum_verification=True)
         if table.schema != _SCHEMA:
             raise ValueError(f"its columns must be {_SCHEMA.names} of text, found {table.schema.names}")
         return tuple(InventoryRow(**{**row, "state": UnitState(row["state"])}) for row in table.to_pylist())
