@@ -1,6 +1,7 @@
 """The robot as a disc: where its centre may be, how near it comes to what is occupied, whether a path is free."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 from numba import njit
@@ -9,7 +10,7 @@ from wsm_data.schema.arrays import BoolArray, Float64Array, Uint8Array
 from wsm_data.schema.occupancy import FREE, OCCUPIED, OccupancyGrid
 
 
-def traversable_cells(grid: OccupancyGrid, radius_m: float) -> BoolArray:
+def traversable(grid: OccupancyGrid, radius_m: float) -> BoolArray:
     """FREE cells whose centre is at least `radius_m` from the centre of every OCCUPIED cell; bool [Y, X].
 
     Centres, not edges, are compared: the surface inside an occupied cell lies anywhere in it, on average at its
@@ -20,7 +21,7 @@ def traversable_cells(grid: OccupancyGrid, radius_m: float) -> BoolArray:
     return _outside_discs(np.ascontiguousarray(grid.cells), radius_cells**2 * (1 - 1e-12))
 
 
-@njit(cache=True)
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def _outside_discs(cells: Uint8Array, radius_squared: float) -> BoolArray:
     """FREE cells with no OCCUPIED one at a squared distance (in cells) below `radius_squared`."""
     rows, columns = cells.shape
@@ -35,7 +36,7 @@ def _outside_discs(cells: Uint8Array, radius_squared: float) -> BoolArray:
     return free
 
 
-@njit(cache=True)
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def _row_gaps(cells: Uint8Array) -> Float64Array:
     """Distance of every cell to the nearest OCCUPIED one of its own row, in cells; infinite where there is none."""
     rows, columns = cells.shape
@@ -67,7 +68,7 @@ def clearance_m(grid: OccupancyGrid, xy_m: Float64Array) -> Float64Array:
     return _nearest_squares(np.ascontiguousarray(grid.cells), flat).reshape(positions.shape[:-1]) * grid.resolution_m
 
 
-@njit(cache=True)
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def _nearest_squares(cells: Uint8Array, positions: Float64Array) -> Float64Array:
     """Distance in cells from each (x, y) to the nearest OCCUPIED square: rings of cells, until none can be nearer."""
     rows, columns = cells.shape
@@ -75,8 +76,8 @@ def _nearest_squares(cells: Uint8Array, positions: Float64Array) -> Float64Array
     for index in range(len(positions)):
         x, y = positions[index, 0], positions[index, 1]
         # rings are counted around the map's cell that is nearest to the position
-        column0 = min(max(int(math.floor(x)), 0), columns - 1)
-        row0 = min(max(int(math.floor(y)), 0), rows - 1)
+        column0 = min(max(math.floor(x), 0), columns - 1)
+        row0 = min(max(math.floor(y), 0), rows - 1)
         best = np.inf
         for ring in range(max(rows, columns)):
             if ring - 1 > best:  # a cell of this ring is at least ring - 1 cells away
@@ -116,7 +117,7 @@ def densify(path_xy_m: Float64Array, step_m: float) -> Float64Array:
     """The positions of a path [T, 2] and evenly spaced ones between them, no more than `step_m` apart; [N, 2]."""
     path = np.asarray(path_xy_m, np.float64)
     parts = [path[:1]]
-    for start, end in zip(path[:-1], path[1:], strict=True):
+    for start, end in pairwise(path):
         steps = max(1, math.ceil(float(np.linalg.norm(end - start)) / step_m))
         parts.append(start + (end - start) * (np.arange(1, steps + 1) / steps)[:, None])
     return np.concatenate(parts)

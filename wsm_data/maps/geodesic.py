@@ -16,12 +16,12 @@ import math
 import numpy as np
 from numba import njit
 
-from wsm_data.maps.footprint import traversable_cells
+from wsm_data.maps.footprint import traversable as where_traversable
 from wsm_data.maps.sight import clip_slopes, segment_is_clear, sweep_octant
 from wsm_data.schema.arrays import BoolArray, Float32Array, Float64Array, Uint8Array, require_array
 from wsm_data.schema.occupancy import FREE, OccupancyGrid
 
-_SLACK_CELLS = 0.5
+_SLACK_CELLS = 0.05
 _REACH_PER_RADIUS = math.sqrt(2)
 """A free cell in a right-angled corner of walls is up to sqrt(2) radii away from the nearest traversable one."""
 
@@ -44,7 +44,7 @@ def geodesic_distance(
     """
     column, row = grid.fractional_cells(np.asarray(goal_xy_m, np.float64))
     return geodesic_field(
-        traversable_cells(grid, robot_radius_m),
+        where_traversable(grid, robot_radius_m),
         grid.cells != FREE,
         (float(column), float(row)),
         grid.resolution_m,
@@ -97,7 +97,7 @@ def geodesic_field(
     return np.maximum(distance[1:-1, 1:-1] * resolution_m - goal_radius_m, 0.0).astype(np.float32)
 
 
-@njit(cache=True)
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def _turning_corners(opaque: BoolArray) -> Uint8Array:
     """For each cell of [Y, X] the corners of it around which a path can bend; uint8 [Y, X].
 
@@ -117,7 +117,7 @@ def _turning_corners(opaque: BoolArray) -> Uint8Array:
     return turns
 
 
-@njit(cache=True)
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def _bend(turns: int, dx: float, dy: float, side: float) -> tuple[float, float]:
     """The farthest direction into which a path that arrives along (dx, dy) can bend around a corner of its cell.
 
@@ -139,7 +139,7 @@ def _bend(turns: int, dx: float, dy: float, side: float) -> tuple[float, float]:
     return ex, ey
 
 
-@njit(cache=True)
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def _sweep_wedge(
     opaque: BoolArray,
     turns: Uint8Array,
@@ -174,7 +174,7 @@ def _sweep_wedge(
         )
 
 
-@njit(cache=True)
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def _start(
     opaque: BoolArray, walls: BoolArray, distance: Float64Array, x: float, y: float, reach: float
 ) -> list[tuple[float, int]]:
@@ -185,17 +185,16 @@ def _start(
     for row in range(max(0, int(y - reach)), min(rows, int(y + reach) + 1)):
         for column in range(max(0, int(x - reach)), min(columns, int(x + reach) + 1)):
             straight = math.sqrt((column + 0.5 - x) ** 2 + (row + 0.5 - y) ** 2)
-            if not opaque[row, column] and straight <= reach:
-                if segment_is_clear(walls, x, y, column + 0.5, row + 0.5):
-                    distance[row, column] = straight
-                    heapq.heappush(queue, (straight, row * columns + column))
+            if opaque[row, column] or straight > reach:
+                continue
+            if segment_is_clear(walls, x, y, column + 0.5, row + 0.5):
+                distance[row, column] = straight
+                heapq.heappush(queue, (straight, row * columns + column))
     return queue
 
 
-@njit(cache=True)
-def _solve(
-    opaque: BoolArray, walls: BoolArray, turns: Uint8Array, x: float, y: float, reach: float
-) -> Float64Array:
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _solve(opaque: BoolArray, walls: BoolArray, turns: Uint8Array, x: float, y: float, reach: float) -> Float64Array:
     """Distances in cells, float64 [Y, X], of padded arrays; `turns` as of `_turning_corners`, goal at (x, y)."""
     rows, columns = opaque.shape
     distance = np.full(opaque.shape, np.inf)
@@ -228,7 +227,7 @@ def _solve(
     return distance
 
 
-@njit(cache=True)
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def _reach_into_bands(
     opaque: BoolArray, walls: BoolArray, distance: Float64Array, x: float, y: float, reach: float
 ) -> None:
@@ -247,7 +246,8 @@ def _reach_into_bands(
                     if opaque[i, j] or distance[i, j] >= best:
                         continue
                     straight = math.sqrt((i - row) ** 2 + (j - column) ** 2)
-                    if straight <= reach and distance[i, j] + straight < best:
-                        if segment_is_clear(walls, column + 0.5, row + 0.5, j + 0.5, i + 0.5):
-                            best = distance[i, j] + straight
+                    if straight > reach or distance[i, j] + straight >= best:
+                        continue
+                    if segment_is_clear(walls, column + 0.5, row + 0.5, j + 0.5, i + 0.5):
+                        best = distance[i, j] + straight
             distance[row, column] = best

@@ -1,9 +1,9 @@
 """What can be seen of a grid from a point: cones of rays that are swept over the cells, and single segments.
 
-Positions are continuous (x, y) in cells: cell (row, column) is the square [column, column + 1] x [row, row + 1] and its
-centre is (column + 1/2, row + 1/2). The line-of-sight rule of the whole package is the strict supercover: two points see
-each other if the segment between them touches no opaque square, not even at a corner. So nothing is seen through
-the point where two opaque cells meet diagonally.
+Positions are continuous (x, y) in cells: cell (row, column) is the square [column, column + 1] x [row, row + 1] and
+its centre is (column + 1/2, row + 1/2). The line-of-sight rule of the whole package is the strict supercover: two
+points see each other if the segment between them touches no opaque square, not even at a corner. So nothing is seen
+through the point where two opaque cells meet diagonally.
 """
 
 import heapq
@@ -19,7 +19,7 @@ _EDGE = 1e-9
 Slopes that a map's corners and centres can form differ by 1 / cells^2, a million times as much."""
 
 
-@njit(cache=True)
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def clip_slopes(lo: float, hi: float, offset: float, gradient: float) -> tuple[float, float]:
     """Cut the slopes [lo, hi] to where offset + slope * gradient <= 0; the cut is empty where lo >= hi."""
     if gradient > 0.0:
@@ -29,7 +29,7 @@ def clip_slopes(lo: float, hi: float, offset: float, gradient: float) -> tuple[f
     return (lo, hi) if offset < 0.0 else (0.0, 0.0)
 
 
-@njit(cache=True)
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def _narrow(cones: Float64Array, count: int, lo: float, hi: float, seen: bool, kept: bool, cut: Float64Array) -> int:
     """Append the cone (lo, hi) of a row's stretch of sight, cut to the rays that can still improve something."""
     if kept:
@@ -40,7 +40,7 @@ def _narrow(cones: Float64Array, count: int, lo: float, hi: float, seen: bool, k
     return count
 
 
-@njit(cache=True)
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def sweep_octant(  # one loop over rows, cones and cells: the heart of the field's speed, not worth cutting up
     opaque: BoolArray,
     turns: Uint8Array,
@@ -79,7 +79,7 @@ def sweep_octant(  # one loop over rows, cones and cells: the heart of the field
     now[0, 0] = slopes[0] if slopes[0] > 0.0 else -_EDGE
     now[0, 1] = slopes[1] if slopes[1] < 1.0 else 1.0 + _EDGE
     count = 1
-    row = int(math.floor(forward0))
+    row = math.floor(forward0)
     while count > 0:
         near, middle, far = row - forward0, row + 0.5 - forward0, row + 1 - forward0
         following = 0
@@ -87,8 +87,8 @@ def sweep_octant(  # one loop over rows, cones and cells: the heart of the field
             lo, hi = now[i, 0], now[i, 1]
             cut[0], cut[1] = lo, hi
             seen = kept = False
-            last = int(math.floor(side0 + hi * far))
-            for column in range(int(math.floor(side0 + lo * max(near, 0.0))), last + 1):
+            last = math.floor(side0 + hi * far)
+            for column in range(math.floor(side0 + lo * max(near, 0.0)), last + 1):
                 cell = origin + column * step_side + row * step_forward
                 if opaque[cell]:
                     following = _narrow(after, following, lo, min(hi, (column - side0) / far), seen, kept, cut)
@@ -120,16 +120,16 @@ def sweep_octant(  # one loop over rows, cones and cells: the heart of the field
         row += 1
 
 
-@njit(cache=True)
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def segment_is_clear(opaque: BoolArray, x0: float, y0: float, x1: float, y1: float) -> bool:
     """Whether two points of a grid see each other; opaque is bool [Y, X] and both points lie inside it."""
     if x0 > x1:
         x0, y0, x1, y1 = x1, y1, x0, y0
     gradient = (y1 - y0) / (x1 - x0) if x1 > x0 else 0.0
-    for column in range(int(math.floor(x0 - _EDGE)), int(math.floor(x1 + _EDGE)) + 1):
+    for column in range(math.floor(x0 - _EDGE), math.floor(x1 + _EDGE) + 1):
         enter = y0 + (max(float(column), x0) - x0) * gradient
         leave = y0 + (min(column + 1.0, x1) - x0) * gradient if x1 > x0 else y1
-        for row in range(int(math.floor(min(enter, leave) - _EDGE)), int(math.floor(max(enter, leave) + _EDGE)) + 1):
+        for row in range(math.floor(min(enter, leave) - _EDGE), math.floor(max(enter, leave) + _EDGE) + 1):
             if opaque[row, column]:
                 return False
     return True
