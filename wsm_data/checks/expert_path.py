@@ -1,0 +1,35 @@
+"""Does the expert drive where a robot can be?"""
+
+import numpy as np
+
+from wsm_data.errors import Reason
+from wsm_data.schema.arrays import Float64Array
+from wsm_data.schema.verdict import Verdict
+
+MIN_CLEARANCE_M = 0.10
+"""Nearest an expert's camera may come to an obstacle, m. The smallest clearance measured in the source is 0.21 m, and a
+map of 0.05 m cells misplaces path and obstacle by up to half a cell's diagonal each, 0.035 m. So a sound path keeps
+0.14 m on the map; under 0.10 m the path, the map or their alignment is wrong."""
+
+
+def check_expert_path(clearance_m: Float64Array, where: str, min_clearance_m: float = MIN_CLEARANCE_M) -> Verdict:
+    """Refuse a path that leads through or along an obstacle (`path.through_obstacle`).
+
+    Args:
+        clearance_m: distance of every camera position to the nearest occupied cell over the floor, m, 0 inside one;
+            float64 [T].
+        where: what to call the trajectory in the message.
+        min_clearance_m: the limit, m.
+    """
+    nearest = int(np.argmin(clearance_m))
+    measured = {"min_clearance_m": float(clearance_m[nearest]), "median_clearance_m": float(np.median(clearance_m))}
+    close = int(np.count_nonzero(~(clearance_m >= min_clearance_m)))
+    if close == 0:
+        return Verdict(measured=measured)
+    message = (
+        f"{where}: the expert must keep {min_clearance_m:.2f} m from obstacles, and comes within "
+        f"{clearance_m[nearest]:.2f} m at frame {nearest} ({close} frames are too near); do path and map "
+        "belong together?"
+    )
+    details = {**measured, "frame": nearest, "frames": close}
+    return Verdict(reason=Reason.PATH_THROUGH_OBSTACLE, message=message, measured=details)

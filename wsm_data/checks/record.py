@@ -1,0 +1,23 @@
+"""All checks that need nothing but the record, in the order in which they are told."""
+
+from collections.abc import Callable
+
+from wsm_data.checks.intrinsics_fit import check_intrinsics_fit
+from wsm_data.checks.length import check_length
+from wsm_data.checks.mount import check_mount
+from wsm_data.checks.pose_jump import check_pose_jump
+from wsm_data.schema.dataset import DatasetManifest
+from wsm_data.schema.episode import EpisodeRecord
+from wsm_data.schema.verdict import Verdict
+
+RECORD_CHECKS: tuple[Callable[[EpisodeRecord, DatasetManifest], Verdict], ...] = (
+    lambda record, dataset: check_length(record, dataset.min_frames),
+    lambda record, dataset: check_intrinsics_fit(record, dataset.cameras),
+    lambda record, dataset: check_mount(record, dataset),
+    lambda record, _dataset: check_pose_jump(record),
+)
+
+
+def check_record(record: EpisodeRecord, dataset: DatasetManifest) -> tuple[Verdict, ...]:
+    """Verdicts of all record checks, in the order of RECORD_CHECKS; a failed one does not stop the others."""
+    return tuple(check(record, dataset) for check in RECORD_CHECKS)
