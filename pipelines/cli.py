@@ -89,6 +89,13 @@ _OPTIONS: dict[str, tuple[Any, Any]] = {
 }
 """The options of every command that runs stages: annotation and default. They stand here, and only here."""
 
+_OUT_OPTIONAL = (
+    Annotated[
+        Path | None, typer.Option("--out", "-o", help="Folder to write; verify needs none, report takes report/.")
+    ],
+    None,
+)
+
 ReleaseArgument = Annotated[str, typer.Argument(metavar="RELEASE", help="Folder or URL of a release.")]
 
 
@@ -98,7 +105,7 @@ def _command(name: str, summary: str, call: Callable[..., None], **arguments: An
         *(inspect.Parameter(one, inspect.Parameter.KEYWORD_ONLY, annotation=kind) for one, kind in arguments.items()),
         *(
             inspect.Parameter(one, inspect.Parameter.KEYWORD_ONLY, annotation=kind, default=default)
-            for one, (kind, default) in _OPTIONS.items()
+            for one, (kind, default) in (_OPTIONS | ({"out": _OUT_OPTIONAL} if "release" in arguments else {})).items()
         ),
     ]
 
@@ -121,7 +128,8 @@ def _fail(message: str, code: int) -> None:
 
 
 def _add_stage_command(entry: StageEntry) -> None:
-    _command(entry.name, entry.summary, lambda **options: _load("stages").run_one(entry.name, **options))
+    arguments = {"release": ReleaseArgument} if entry.reads_release else {}
+    _command(entry.name, entry.summary, lambda **values: _load("stages").run_one(entry.name, **values), **arguments)
 
 
 for _entry in STAGES:
@@ -150,6 +158,7 @@ def inspect_release(
         Path | None, typer.Option("--out", "-o", help="Contact sheet to write; default: KEY.png here.")
     ] = None,
     limit: Annotated[int, typer.Option("--limit", min=0, help="Clips to list; 0: all.")] = 20,
+    weights: Annotated[str, typer.Option("--weights", help="Folder of the codec's weights, where it has any.")] = "",
 ) -> None:
     """List a release, or show one clip and draw it."""
-    _load("inspect").inspect_release(release, key, out, limit)
+    _load("inspect").inspect_release(release, key, out, limit, weights)

@@ -1,67 +1,40 @@
 """From one trajectory and its map to one clip: the only place where videos, poses and geodesics meet."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
-from wsm_data.checks.expert_path import check_expert_path
-from wsm_data.checks.reachability import check_goal_reachable
-from wsm_data.maps.crop import crop_around, free_swept_cells
-from wsm_data.maps.occupancy import occupancy_for
-from wsm_data.maps.scene_map import SceneMap
 
 from wsm_data.codecs.base import VideoCodec
 from wsm_data.codecs.clip_video import depth_video, pad_frames, padded_length, rgb_video
 from wsm_data.codecs.depth import depth_m_from_latent_video, valid_share
 from wsm_data.codecs.quality import CodecQuality, clip_quality, depth_error_by_range
 from wsm_data.geometry.transform import relative_to_first, vectors_from_transforms
-from wsm_data.maps.footprint import clearance_m, traversable
-from wsm_data.maps.geodesic import geodesic_field
-from wsm_data.maps.progress import field_to_mm, sample_distance
+from wsm_data.maps.progress import field_to_mm
 from wsm_data.readers.frames import EpisodeFrames
 from wsm_data.schema.arrays import BoolArray, Float32Array, Float64Array
 from wsm_data.schema.clip import Clip
 from wsm_data.schema.dataset import DatasetManifest
 from wsm_data.schema.depth import DepthRange
 from wsm_data.schema.episode import EpisodeRecord
-from wsm_data.schema.occupancy import OCCUPIED, OccupancyGrid
 
 
 @dataclass(frozen=True, kw_only=True)
-class ClipConfig:
-    """What a clip holds; where the paper is silent, the comment says so.
+class Provenance:
+    """What is known about a clip beside its arrays.
 
     Attributes:
-        width: encoded width, px (table 4).
-        height: encoded height, px (table 4).
-        depth_range: metric range of the log-depth normalisation (app. A.1).
-        still_frames: repeats of the last frame after the end, so that staying is learned; paper silent, K M = 16.
-        goal_radius_m: radius r_g of the goal region, m (table 5).
-        map_margin_m: the map crop reaches this far beyond path and goal, m; paper silent.
+        dataset: the source's conventions.
+        map_digest: digest of the scene's surface.
+        map_from: `cloud` or `depth`.
+        codec: name of the codec.
+        codec_digest: digest of the codec.
     """
 
-    width: int = 320
-    height: int = 192
-    depth_range: DepthRange = field(default_factory=DepthRange)
-    still_frames: int = 16
-    goal_radius_m: float = 0.2
-    map_margin_m: float = 2.0
-
-
-@dataclass(frozen=True, kw_only=True)
-class SceneView:
-    """A trajectory on the map of its scene.
-
-    Attributes:
-        occupancy: crop of the map around path and goal.
-        geodesic_m: geodesic distance to the goal region on the crop, m; float32 [Y, X].
-        distance_m: geodesic distance of every camera position, m; float64 [T].
-        freed_cells: unknown cells that the expert's footprint swept.
-    """
-
-    occupancy: OccupancyGrid
-    geodesic_m: Float32Array
-    distance_m: Float64Array
-    freed_cells: int
+    dataset: DatasetManifest
+    map_digest: str
+    map_from: str
+    codec: str
+    codec_digest: str
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,38 +50,6 @@ class ClipVideos:
     rgb: Float32Array
     depth: Float32Array
     depth_valid: BoolArray
-
-
-def view_scene(record: EpisodeRecord, scene_map: SceneMap, dataset: DatasetManifest, config: ClipConfig) -> SceneView:
-    """Cut the map for this robot, free what it swept, and measure distances to the goal on the whole floor.
-
-    The field is computed before the crop: a detour may lead through rooms that the crop leaves out.
-
-    Raises:
-        DataError: the path leads through an obstacle, or the goal cannot be reached.
-    """
-    path_xy_m = record.path_xy_m
-    whole = occupancy_for(scene_map, record.floor_z_m, record.camera_height_m, dataset.robot)
-    whole = crop_around(whole, _corners_m(whole, path_xy_m), config.map_margin_m)
-    whole, freed = free_swept_cells(whole, path_xy_m, dataset.robot.radius_m)
-    _require(check_expert_path(clearance_m(whole, path_xy_m), record.id.text))
-    goal_cell = whole.fractional_cells(path_xy_m[-1])
-    geodesic_m = geodesic_field(
-        traversable(whole, dataset.robot.radius_m),
-        whole.cells == OCCUPIED,
-        (float(goal_cell[0]), float(goal_cell[1])),
-        whole.resolution_m,
-        config.goal_radius_m,
-    )
-    distance_m = sample_distance(geodesic_m, whole, path_xy_m)
-    _require(check_goal_reachable(distance_m, record.id.text))
-    crop = crop_around(whole, path_xy_m, config.map_margin_m)
-    return SceneView(
-        occupancy=crop,
-        geodesic_m=_same_crop(geodesic_m, whole, crop),
-        distance_m=distance_m,
-        freed_cells=freed,
-    )
 
 
 def read_videos(
@@ -133,7 +74,7 @@ def build_clip(
     view: SceneView,
     videos: ClipVideos,
     latents: tuple[Float32Array, Float32Array],
-    provenance: "Provenance",
+    provenance: Provenance,
     config: ClipConfig,
 ) -> Clip:
     """Put a clip together.
@@ -161,25 +102,6 @@ def build_clip(
     )
 
 
-@dataclass(frozen=True, kw_only=True)
-class Provenance:
-    """What is known about a clip beside its arrays.
-
-    Attributes:
-        dataset: the source's conventions.
-        map_digest: digest of the scene's surface.
-        map_from: `cloud` or `depth`.
-        codec: name of the codec.
-        codec_digest: digest of the codec.
-    """
-
-    dataset: DatasetManifest
-    map_digest: str
-    map_from: str
-    codec: str
-    codec_digest: str
-
-
 def measure_quality(
     videos: ClipVideos, latents: tuple[Float32Array, Float32Array], codec: VideoCodec, config: ClipConfig
 ) -> CodecQuality:
@@ -193,3 +115,45 @@ def measure_quality(
         _quality_edges_m(config.depth_range),
     )
     return clip_quality(videos.rgb, rgb, errors)
+
+
+def _meta(record: EpisodeRecord, view: SceneView, length: int, provenance: Provenance, config: ClipConfig) -> ClipMeta:
+    T_world_camera0 = record.T_world_camera[0]
+    goal_world_m = record.T_world_camera[-1, :3, 3]
+    goal_camera0_m = transform_points(invert(T_world_camera0), goal_world_m[None])[0]
+    return ClipMeta(
+        key=record.id.key,
+        id=record.id,
+        dataset=provenance.dataset.name,
+        source_digest=record.content_digest,
+        map_digest=provenance.map_digest,
+        intrinsics=record.intrinsics.resized(config.width, config.height),
+        T_world_camera0=tuple(tuple(row) for row in T_world_camera0.tolist()),
+        goal_world_m=_point(goal_world_m),
+        goal_camera0_m=_point(goal_camera0_m),
+        map_origin_cell=view.occupancy.origin_cell,
+        map_resolution_m=view.occupancy.resolution_m,
+        map_from=provenance.map_from,
+        freed_cells=view.freed_cells,
+        goal_radius_m=config.goal_radius_m,
+        robot_radius_m=provenance.dataset.robot.radius_m,
+        camera_height_m=record.camera_height_m,
+        camera_pitch_rad=record.camera_pitch_rad,
+        frames=length,
+        padded_frames=length - record.frame_count,
+        codec=provenance.codec,
+        codec_digest=provenance.codec_digest,
+        depth_range=config.depth_range,
+        notes=record.notes + ((Reason.CLOUD_MISSING.value,) if provenance.map_from == "depth" else ()),
+    )
+
+
+def _point(xyz_m: Float64Array) -> tuple[float, float, float]:
+    x, y, z = xyz_m.tolist()
+    return x, y, z
+
+
+def _quality_edges_m(depth_range: DepthRange) -> list[float]:
+    """Borders of the ranges by which depth errors are told apart: whole metres inside the depth range."""
+    inside = range(math.floor(depth_range.min_m) + 1, math.ceil(depth_range.max_m))
+    return [depth_range.min_m, *(float(metre) for metre in inside), depth_range.max_m]

@@ -14,10 +14,12 @@ class StageEntry:
     Attributes:
         name: name of the command, and of the module under pipelines.stages that defines `STAGE`.
         summary: one line of help.
+        reads_release: whether it looks at a finished release, which its command then takes as an argument.
     """
 
     name: str
     summary: str
+    reads_release: bool = False
 
 
 STAGES: tuple[StageEntry, ...] = (
@@ -27,8 +29,8 @@ STAGES: tuple[StageEntry, ...] = (
     StageEntry(name="map", summary="Build the map of every scene."),
     StageEntry(name="encode", summary="Turn trajectories into clips of latents and poses."),
     StageEntry(name="pack", summary="Pack clips into a release of indexed shards."),
-    StageEntry(name="verify", summary="Prove that a release is whole, or name the damage."),
-    StageEntry(name="report", summary="Show a release in one HTML file with pictures."),
+    StageEntry(name="verify", summary="Prove that a release is whole, or name the damage.", reads_release=True),
+    StageEntry(name="report", summary="Show a release in one HTML file with pictures.", reads_release=True),
 )
 
 
@@ -38,6 +40,15 @@ def load_stage(name: str) -> Any:
     Raises:
         ConfigError: there is no such stage.
     """
+    return load_stage_module(name).STAGE
+
+
+def load_stage_module(name: str) -> Any:
+    """The module of a stage.
+
+    Raises:
+        ConfigError: there is no such stage.
+    """
     if name not in {entry.name for entry in STAGES}:
         raise ConfigError(f"there is no stage {name!r}; stages: {', '.join(entry.name for entry in STAGES)}")
-    return importlib.import_module(f"pipelines.stages.{name}").STAGE
+    return importlib.import_module(f"pipelines.stages.{name}")

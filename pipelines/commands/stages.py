@@ -12,36 +12,60 @@ import typer
 
 from pipelines.config import build_config, config_json, load_toml, merge, parse_assignments
 from pipelines.recipe import Recipe, load_recipe, stage_config
-from pipelines.registry import load_stage
+from pipelines.registry import load_stage, load_stage_module
 from pipelines.report import StageReport, summary_table
 from pipelines.runner import RunOptions, run_stage
 from wsm_data.errors import ConfigError
 from wsm_data.files.digest import digest_json
 
 
-def run_one(name: str, out: Path, config: Path | None, assignments: Sequence[str] | None, **options: Any) -> None:
-    """Run one stage with settings from its section of a TOML file and from `--set`."""
+def run_one(
+    name: str,
+    out: Path | None,
+    config: Path | None,
+    assignments: Sequence[str] | None,
+    release: str | None = None,
+    **options: Any,
+) -> None:
+    """Run one stage with settings from its section of a TOML file and from `--set`.
+
+    Args:
+        name: the stage.
+        out: its folder; without one, a report goes to report/, and a release is verified without a record of it.
+        config: TOML file with a section of the stage's name.
+        assignments: `key=value` words.
+        release: the release that `verify` and `report` look at.
+        options: what to run now.
+    """
+    if name == "verify" and out is None:
+        clips = load_stage_module(name).require_sound(release, options["quiet"])
+        typer.echo(f"{release} is whole: {clips} clips, every byte and every trajectory accounted for")
+        return
     stage = load_stage(name)
     values = load_toml(config).get(name, {}) if config else {}
-    built = build_config(stage.config_type, merge(values, parse_assignments(assignments or ())), "")
-    report = _run(name, built, out, _options(options))
+    given = {"release": release} if release else {}
+    built = build_config(stage.config_type, merge(merge(values, given), parse_assignments(assignments or ())), "")
+    report = _run(name, built, out or Path(name), _options(options))
     typer.echo(summary_table([report]))
 
 
 def run_recipe(recipe: str, out: Path, config: Path | None, assignments: Sequence[str] | None, **options: Any) -> None:
     """Run the stages of a recipe into `out`, each in a folder of its own, and say where the results are."""
     loaded = load_recipe(recipe, config, parse_assignments(assignments or ()))
+    if (
+        options["limit"] or options["only"]
+    ):  # the selection narrows the first stage; the release says that it is partial
+        loaded = replace(loaded, settings=merge({"pack": {"partial": True}}, loaded.settings))
     run_options = _options(options)
     out = _fork(loaded, out) if run_options.fork else out
     run_options = replace(run_options, fork=False)
     reports: list[StageReport] = []
     for position, name in enumerate(loaded.stages):
-        first = position == 0
         if run_options.dry_run and not _inputs_exist(loaded, name, out):
             typer.echo(f"{name}: will be planned when the stages before it have run")
             continue
         built = stage_config(loaded, name, out)
-        chosen = run_options if first else replace(run_options, limit=0, only=())
+        chosen = run_options if position == 0 else replace(run_options, limit=0, only=())
         reports.append(_run(name, built, out / name, chosen))
     typer.echo(summary_table(reports))
     for label, path in (("release", out / "pack" / "release"), ("report", out / "report" / "report.html")):

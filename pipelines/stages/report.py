@@ -1,0 +1,84 @@
+"""`wsm report`: one HTML file that shows what is in a release."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from pipelines.config import INPUT
+from pipelines.folder import read_ledger, read_stage_record
+from pipelines.registry import STAGES
+from pipelines.release_codec import codec_of
+from pipelines.stage import DONE, REFUSED, Outcome, Stage, StageContext, Unit
+from pipelines.upstream import pending_units
+from wsm_data.files.digest import sha256_bytes, sha256_file
+from wsm_data.files.stores import open_store
+from wsm_data.shards.names import MANIFEST_NAME
+from wsm_data.shards.release import open_release
+from wsm_data.view.clip_survey import SurveyConfig, survey_clips
+from wsm_data.view.report import write_report
+from wsm_data.view.report_data import ReportData, StageSummary
+
+REPORT_FILE = "report.html"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReportConfig:
+    """Settings of `wsm report`.
+
+    Attributes:
+        release: folder or URL of the release.
+        run: run folder whose stages are shown; where it is not given, the one the release lies in, if it does.
+        weights: local folder of the codec's weights, where the codec has any.
+        survey: how many clips are read, and how many are shown.
+    """
+
+    release: str = field(metadata=INPUT)
+    run: str = field(default="", metadata=INPUT)
+    weights: str = field(default="", metadata=INPUT)
+    survey: SurveyConfig = field(default_factory=SurveyConfig)
+
+
+def _list_units(config: ReportConfig) -> Sequence[Unit]:
+    manifest = open_store(config.release).read(MANIFEST_NAME)
+    return [Unit(id="report", inputs={"manifest": sha256_bytes(manifest)})]
+
+
+def _process(batch: Sequence[Unit], config: ReportConfig, context: StageContext) -> Iterator[Outcome]:
+    for unit in batch:
+        release = open_release(config.release)
+        survey = survey_clips(release, codec_of(release.manifest, config.weights), config.survey)
+        path = context.out / REPORT_FILE
+        write_report(ReportData(survey=survey, stages=stage_summaries(_run_folder(config))), release, path)
+        facts = {"bytes": path.stat().st_size, "clips shown": len(survey.thumbnails)}
+        yield Outcome(unit=unit.id, digest=sha256_file(path), outputs=(REPORT_FILE,), facts=facts)
+
+
+def stage_summaries(run: Path) -> tuple[StageSummary, ...]:
+    """What each stage of a run did, in the order of the flow; empty where the folder holds no run."""
+    summaries = []
+    for entry in STAGES:
+        record = read_stage_record(run / entry.name)
+        if record is None or not record.finished:
+            continue
+        outcomes = [one.outcome for one in read_ledger(run / entry.name).values()]
+        summaries.append(
+            StageSummary(
+                name=record.name,
+                version=record.version,
+                units=record.units,
+                done=sum(outcome.state == DONE for outcome in outcomes),
+                refused=sum(outcome.state == REFUSED for outcome in outcomes),
+                pending=len(pending_units(run / entry.name)),
+                seconds=sum(outcome.seconds for outcome in outcomes),
+                workers=record.workers,
+                fingerprint=record.fingerprint,
+            )
+        )
+    return tuple(summaries)
+
+
+def _run_folder(config: ReportConfig) -> Path:
+    return Path(config.run) if config.run else Path(config.release).parent.parent
+
+
+STAGE = Stage(name="report", version=1, config_type=ReportConfig, list_units=_list_units, process=_process)

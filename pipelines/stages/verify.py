@@ -1,0 +1,74 @@
+"""`wsm verify`: proof that a release is whole, or the name of what is damaged."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from tqdm import tqdm
+
+from pipelines.config import INPUT
+from pipelines.stage import Outcome, Stage, StageContext, Unit
+from wsm_data.errors import IntegrityError
+from wsm_data.files.digest import digest_json, sha256_bytes
+from wsm_data.files.stores import open_store
+from wsm_data.shards.findings import Finding
+from wsm_data.shards.names import MANIFEST_NAME
+from wsm_data.shards.release import read_manifest
+from wsm_data.shards.verify import verify_release
+
+_SHOWN_FINDINGS = 20
+
+
+@dataclass(frozen=True, kw_only=True)
+class VerifyConfig:
+    """Settings of `wsm verify`.
+
+    Attributes:
+        release: folder or URL of the release.
+    """
+
+    release: str = field(metadata=INPUT)
+
+
+def require_sound(location: str, quiet: bool = False) -> int:
+    """Read every byte of a release; returns the number of clips.
+
+    Raises:
+        IntegrityError: lists what is damaged, by shard and clip.
+    """
+    manifest = read_manifest(open_store(location))
+    total = sum(shard.bytes for shard in manifest.shards)
+    with tqdm(total=total, unit="B", unit_scale=True, desc="verify", disable=quiet, dynamic_ncols=True) as bar:
+        findings = verify_release(location, bar.update)
+    if findings:
+        raise IntegrityError(_message(location, findings))
+    return manifest.clips
+
+
+def _list_units(config: VerifyConfig) -> Sequence[Unit]:
+    store = open_store(config.release)
+    manifest = read_manifest(store)
+    inputs = {"manifest": sha256_bytes(store.read(MANIFEST_NAME))}
+    if "://" not in config.release:  # a local file that is touched is read again; a remote one is known by its size
+        files = sorted(Path(config.release).iterdir())
+        inputs["files"] = digest_json([[one.name, one.stat().st_size, one.stat().st_mtime_ns] for one in files])
+    return [Unit(id=manifest.name, inputs=inputs)]
+
+
+def _process(batch: Sequence[Unit], config: VerifyConfig, context: StageContext) -> Iterator[Outcome]:
+    del context
+    for unit in batch:
+        clips = require_sound(config.release, quiet=True)
+        yield Outcome(unit=unit.id, digest=unit.inputs["manifest"], facts={"clips": clips, "findings": 0})
+
+
+def _message(location: str, findings: Sequence[Finding]) -> str:
+    lines = [
+        f"  {finding.kind}: {' '.join(part for part in (finding.shard, finding.clip) if part)}: {finding.message}"
+        for finding in findings[:_SHOWN_FINDINGS]
+    ]
+    more = [f"  and {len(findings) - _SHOWN_FINDINGS} more"] if len(findings) > _SHOWN_FINDINGS else []
+    return "\n".join([f"{location} is damaged, {len(findings)} findings:", *lines, *more])
+
+
+STAGE = Stage(name="verify", version=1, config_type=VerifyConfig, list_units=_list_units, process=_process)
