@@ -1,18 +1,25 @@
 """From one trajectory and its map to one clip: the only place where videos, poses and geodesics meet."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
+from pipelines.clip_config import ClipConfig
+from pipelines.gate import require_kept
+from pipelines.scene_view import SceneView
+from wsm_data.checks.depth_measured import check_depth_measured
 from wsm_data.codecs.base import VideoCodec
 from wsm_data.codecs.clip_video import depth_video, pad_frames, padded_length, rgb_video
 from wsm_data.codecs.depth import depth_m_from_latent_video, valid_share
 from wsm_data.codecs.quality import CodecQuality, clip_quality, depth_error_by_range
-from wsm_data.geometry.transform import relative_to_first, vectors_from_transforms
+from wsm_data.errors import Reason
+from wsm_data.geometry.transform import invert, relative_to_first, transform_points, vectors_from_transforms
 from wsm_data.maps.progress import field_to_mm
 from wsm_data.readers.frames import EpisodeFrames
 from wsm_data.schema.arrays import BoolArray, Float32Array, Float64Array
 from wsm_data.schema.clip import Clip
+from wsm_data.schema.clip_meta import ClipMeta
 from wsm_data.schema.dataset import DatasetManifest
 from wsm_data.schema.depth import DepthRange
 from wsm_data.schema.episode import EpisodeRecord
@@ -58,11 +65,12 @@ def read_videos(
     """Decode, resize, normalise and pad the frames of a trajectory.
 
     Raises:
-        DataError: a frame does not decode, or depth and poses disagree.
+        DataError: a frame does not decode, or a depth image has no measurement.
     """
     where = record.id.text
     rgb = rgb_video(frames.rgb, config.width, config.height, where)
     depth, valid = depth_video(frames.depth, dataset.depth, config.depth_range, config.width, config.height, where)
+    require_kept(check_depth_measured(valid, where))
     length = padded_length(record.frame_count, config.still_frames)
     return ClipVideos(
         rgb=pad_frames(rgb, length), depth=pad_frames(depth, length), depth_valid=pad_frames(valid, length)

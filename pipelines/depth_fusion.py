@@ -37,7 +37,7 @@ def fused_points(
                 raw = decode_depth(data, f"{record.id.text}, frame {frame}")
             except DataError:
                 continue
-            depth_m = raw * encoding.metres_per_unit
+            depth_m = raw.astype(np.float64) * encoding.metres_per_unit
             measured = ~np.isin(raw, encoding.invalid_codes) & (depth_m >= limits.min_m) & (depth_m <= limits.max_m)
             points_camera = unproject(depth_m, record.intrinsics)[measured]
             yield transform_points(record.T_world_camera[frame], points_camera)

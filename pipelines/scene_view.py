@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipelines.clip_config import ClipConfig
+from pipelines.gate import require_kept
 from wsm_data.checks.expert_path import check_expert_path
 from wsm_data.checks.reachability import check_goal_reachable
-from wsm_data.errors import DataError
 from wsm_data.maps.crop import crop_around, free_swept_cells
 from wsm_data.maps.footprint import clearance_m
 from wsm_data.maps.geodesic import geodesic_distance
@@ -18,7 +18,6 @@ from wsm_data.schema.arrays import Float32Array, Float64Array
 from wsm_data.schema.dataset import DatasetManifest
 from wsm_data.schema.episode import EpisodeRecord
 from wsm_data.schema.occupancy import OccupancyGrid
-from wsm_data.schema.verdict import Verdict
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,10 +50,10 @@ def view_scene(record: EpisodeRecord, scene_map: SceneMap, dataset: DatasetManif
     floor = occupancy_for(scene_map, record.floor_z_m, record.camera_height_m, dataset.robot)
     floor = crop_around(floor, np.concatenate([_corners_xy_m(floor), path_xy_m]), config.map_margin_m)
     floor, freed = free_swept_cells(floor, path_xy_m, radius_m)
-    _require(check_expert_path(clearance_m(floor, path_xy_m)), record)
+    require_kept(check_expert_path(clearance_m(floor, path_xy_m), record.id.text))
     geodesic_m = geodesic_distance(floor, path_xy_m[-1], radius_m, config.goal_radius_m)
     distance_m = sample_distance(geodesic_m, floor, path_xy_m)
-    _require(check_goal_reachable(distance_m), record)
+    require_kept(check_goal_reachable(distance_m, record.id.text))
     crop = crop_around(floor, path_xy_m, config.map_margin_m)
     column, row = (inner - outer for inner, outer in zip(crop.origin_cell, floor.origin_cell, strict=True))
     height, width = crop.cells.shape
@@ -69,8 +68,3 @@ def view_scene(record: EpisodeRecord, scene_map: SceneMap, dataset: DatasetManif
 def _corners_xy_m(grid: OccupancyGrid) -> Float64Array:
     rows, columns = grid.cells.shape
     return grid.cell_centres_xy_m(np.array([[0, 0], [columns - 1, rows - 1]], np.float64))
-
-
-def _require(verdict: Verdict, record: EpisodeRecord) -> None:
-    if verdict.reason is not None:
-        raise DataError(verdict.reason, f"{record.id.text}: {verdict.message}", verdict.measured)

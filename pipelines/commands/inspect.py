@@ -17,7 +17,7 @@ def inspect_release(location: str, key: str | None, out: Path | None, limit: int
     release = open_release(location)
     if key is None:
         typer.echo(describe_release(release))
-        keys = sorted(release.index.keys())
+        keys = sorted(release.index.texts("key"))
         shown = keys[:limit] if limit else keys
         typer.echo("\nclips\n" + "\n".join(f"  {one}" for one in shown))
         if len(shown) < len(keys):
@@ -32,7 +32,7 @@ def inspect_release(location: str, key: str | None, out: Path | None, limit: int
 
 def _key(release: Release, text: str) -> str:
     """A clip's key, given as key or as the id of its trajectory."""
-    keys = set(release.index.keys())
+    keys = set(release.index.texts("key"))
     if text not in keys and text.count("/") == 2:
         return EpisodeId.parse(text).key
     return text

@@ -1,26 +1,18 @@
 """`wsm encode`: trajectories into clips, one sequential pass over every archive and folder."""
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from wsm_data.maps.scene_map import SceneMap, load_scene_map
-
-from pipelines.clip_builder import (
-    ClipConfig,
-    ClipVideos,
-    Provenance,
-    SceneView,
-    build_clip,
-    measure_quality,
-    read_videos,
-    view_scene,
-)
+from pipelines.clip_builder import ClipVideos, Provenance, build_clip, measure_quality, read_videos
+from pipelines.clip_config import ClipConfig
 from pipelines.config import INPUT
+from pipelines.depth_gate import require_depth_agreement
 from pipelines.episode_table import read_episodes
 from pipelines.layout import clips_folder, codec_path, map_path, records_path
+from pipelines.scene_view import SceneView, view_scene
 from pipelines.source import IndexedSource, container_from_json, conventions_digest, indexed_source
 from pipelines.stage import Outcome, Settled, Stage, StageContext, Unit, refused
 from pipelines.upstream import done_outcomes, quarantine_of, require_stage
@@ -29,6 +21,7 @@ from wsm_data.codecs.registry import CodecConfig, make_codec
 from wsm_data.errors import DataError
 from wsm_data.files.atomic import write_text
 from wsm_data.files.digest import sha256_bytes
+from wsm_data.maps.scene_map import SceneMap, floor_levels, load_scene_map
 from wsm_data.readers.containers import Container
 from wsm_data.readers.frames import iter_episode_frames
 from wsm_data.readers.record_table import read_records
@@ -62,7 +55,6 @@ class _SceneInput:
     """What the worker of one container needs beside the container; it pickles."""
 
     container: Container
-    map_digest: str
     map_from: str
 
 
@@ -97,7 +89,7 @@ def _list_units(config: EncodeConfig) -> Sequence[Unit]:
                 source=row.container,
                 inputs={
                     "trajectory": row.digest,
-                    "map": mapped.digest if mapped else f"refused {without.reason}" if without else "",
+                    "map": level_digest(mapped.facts, row.floor_z_m) if mapped else f"refused {without.reason}",
                     "codec": codec,
                     "dataset": conventions,
                 },
@@ -105,12 +97,17 @@ def _list_units(config: EncodeConfig) -> Sequence[Unit]:
                 payload=without
                 or _SceneInput(
                     container=container_from_json(facts["container"]),
-                    map_digest=facts["surface"],
                     map_from="depth" if mapped and mapped.facts["fused_from_depth"] else "cloud",
                 ),
             )
         )
     return units
+
+
+def level_digest(map_facts: Mapping[str, Any], floor_z_m: float) -> str:
+    """Digest of the map level a trajectory lies on: a trajectory on another floor changes nothing here."""
+    levels = dict(map_facts["levels"])
+    return str(levels[floor_levels([floor_z_m])[0]])
 
 
 def _process(batch: Sequence[Unit], config: EncodeConfig, context: StageContext) -> Iterator[Outcome]:
@@ -144,6 +141,7 @@ def _prepare(
     for record, frames in iter_episode_frames(source.root, scene.container, records):
         unit = units[record.id.text]
         try:
+            require_depth_agreement(record, frames, source.dataset)
             view = view_scene(record, scene_map, source.dataset, config.clip)
             yield _Prepared(
                 unit=unit, record=record, view=view, videos=read_videos(record, frames, source.dataset, config.clip)
@@ -162,15 +160,15 @@ def _encode(
 ) -> Iterator[Outcome]:
     latents = codec.encode_many([video for one in waiting for video in (one.videos.rgb, one.videos.depth)])
     info = codec.describe()
-    provenance = Provenance(
-        dataset=source.dataset,
-        map_digest=scene.map_digest,
-        map_from=scene.map_from,
-        codec=info.name,
-        codec_digest=info.digest,
-    )
     for number, one in enumerate(waiting):
         pair = latents[2 * number], latents[2 * number + 1]
+        provenance = Provenance(
+            dataset=source.dataset,
+            map_digest=one.unit.inputs["map"],
+            map_from=scene.map_from,
+            codec=info.name,
+            codec_digest=info.digest,
+        )
         clip = build_clip(one.record, one.view, one.videos, pair, provenance, config.clip)
         fragment = build_fragment(clip)
         path = write_fragment(clips_folder(out), fragment)

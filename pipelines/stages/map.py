@@ -6,9 +6,6 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
-from wsm_data.maps.scene_map import build_scene_map, floor_levels, save_scene_map, scene_map_digest
-from wsm_data.maps.voxels import load_voxels
-
 from pipelines.config import INPUT
 from pipelines.folder import refusal_from_json
 from pipelines.layout import map_path, surface_path
@@ -17,6 +14,8 @@ from pipelines.stage import Outcome, Stage, StageContext, Unit, refused
 from pipelines.upstream import done_outcomes
 from wsm_data.errors import DataError, Reason
 from wsm_data.files.digest import digest_json
+from wsm_data.maps.scene_map import build_scene_map, floor_levels, save_scene_map, scene_map_digest
+from wsm_data.maps.voxels import load_voxels
 
 
 class WithoutCloud(StrEnum):
@@ -77,12 +76,16 @@ def _map_scene(unit: Unit, config: MapConfig, out: Path) -> Outcome:
             f"{unit.id} has no point cloud; add meta/pointcloud.ply, or let the map be fused from depth images with "
             "without_cloud = fuse",
         )
-    robot = indexed_source(config.index).dataset.robot
-    scene_map = build_scene_map(voxels, _floors(unit.payload), robot)
+    dataset = indexed_source(config.index).dataset
+    scene_map = build_scene_map(voxels, _floors(unit.payload), dataset.robot, dataset.max_camera_height_m)
     path = map_path(out, unit.id)
     path.parent.mkdir(parents=True, exist_ok=True)
     save_scene_map(path, scene_map)
-    facts = {"floors": len(scene_map.levels), "fused_from_depth": int(voxels.origin == "depth")}
+    facts = {
+        "floors": len(scene_map.levels),
+        "fused_from_depth": int(voxels.origin == "depth"),
+        "levels": [[level.floor_z_m, scene_map_digest(scene_map, level.floor_z_m)] for level in scene_map.levels],
+    }
     return Outcome(unit=unit.id, digest=scene_map_digest(scene_map), outputs=(str(path.relative_to(out)),), facts=facts)
 
 
