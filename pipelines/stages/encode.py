@@ -78,29 +78,19 @@ def _list_units(config: EncodeConfig) -> Sequence[Unit]:
     refused_maps = {refusal.unit: refusal for refusal in quarantine_of(config.map)}
     units = []
     for row in read_episodes(config.index):
-        facts = containers[row.container].facts
-        mapped = maps.get(row.container)
         without = refused_maps.get(row.container)
-        if mapped is None and without is None:
+        if without is not None:
+            scene: _SceneInput | Refusal = without
+            map_digest = f"refused {without.reason}"
+        elif row.container in maps:
+            mapped = maps[row.container].facts
+            container = container_from_json(containers[row.container].facts["container"])
+            scene = _SceneInput(container=container, map_from="depth" if mapped["fused_from_depth"] else "cloud")
+            map_digest = level_digest(mapped, row.floor_z_m)
+        else:
             continue  # its map is pending, and so is the trajectory
-        units.append(
-            Unit(
-                id=row.id.text,
-                source=row.container,
-                inputs={
-                    "trajectory": row.digest,
-                    "map": level_digest(mapped.facts, row.floor_z_m) if mapped else f"refused {without.reason}",
-                    "codec": codec,
-                    "dataset": conventions,
-                },
-                batch=row.container,
-                payload=without
-                or _SceneInput(
-                    container=container_from_json(facts["container"]),
-                    map_from="depth" if mapped and mapped.facts["fused_from_depth"] else "cloud",
-                ),
-            )
-        )
+        inputs = {"trajectory": row.digest, "map": map_digest, "codec": codec, "dataset": conventions}
+        units.append(Unit(id=row.id.text, source=row.container, inputs=inputs, batch=row.container, payload=scene))
     return units
 
 
@@ -112,7 +102,7 @@ def level_digest(map_facts: Mapping[str, Any], floor_z_m: float) -> str:
 
 def _process(batch: Sequence[Unit], config: EncodeConfig, context: StageContext) -> Iterator[Outcome]:
     scene = batch[0].payload
-    if not isinstance(scene, _SceneInput):
+    if isinstance(scene, Refusal):
         for unit in batch:
             message = f"the scene of {unit.id} has no map: {scene.message}"
             yield refused(unit, DataError(scene.reason, message, scene.details))

@@ -94,8 +94,8 @@ def _require_complete(config: PackConfig) -> None:
     pending = _pending(config)
     if pending and not config.partial:
         raise ConfigError(
-            f"{len(pending)} units are pending, such as {pending[0]}: run `wsm index`, `wsm map` and `wsm encode` to their "
-            "end, or pack what there is with --set partial=true"
+            f"{len(pending)} units are pending, such as {pending[0]}; run `wsm index`, `wsm map` and `wsm encode` to "
+            "their end, or pack what there is with --set partial=true"
         )
 
 
