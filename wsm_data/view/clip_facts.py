@@ -9,6 +9,7 @@ from wsm_data.geometry.transform import transform_points
 from wsm_data.schema.arrays import Float64Array
 from wsm_data.schema.clip import UNREACHABLE_MM, Clip
 from wsm_data.schema.occupancy import OCCUPIED, UNKNOWN, OccupancyGrid
+from wsm_data.shards.statistics import real_latents
 
 # A square's nearest point is nearer than its centre by between 1/2 and 1/sqrt(2) of its side, so the nearest square is
 # among the few nearest centres.
@@ -35,6 +36,7 @@ class ClipFacts:
         depth_valid_share: share of depth pixels with a measurement.
         map_area_m2: area of the map crop, m^2.
         map_unknown_share: share of the crop's cells that are unknown.
+        notes: reason codes of what was accepted but is worth knowing.
     """
 
     key: str
@@ -50,6 +52,7 @@ class ClipFacts:
     depth_valid_share: float
     map_area_m2: float
     map_unknown_share: float
+    notes: tuple[str, ...]
 
 
 def clip_facts(clip: Clip) -> ClipFacts:
@@ -70,6 +73,7 @@ def clip_facts(clip: Clip) -> ClipFacts:
         depth_valid_share=depth_valid_share(clip),
         map_area_m2=clip.occupancy.size * meta.map_resolution_m**2,
         map_unknown_share=float((clip.occupancy == UNKNOWN).mean()),
+        notes=meta.notes,
     )
 
 
@@ -97,7 +101,7 @@ def clip_field_m(clip: Clip) -> Float64Array:
 
 def depth_valid_share(clip: Clip) -> float:
     """Share of depth pixels with a measurement, over the latent frames that hold more than padding."""
-    latents = 1 + -(-(moving_frames(clip) - 1) // 4)
+    latents = real_latents(clip.frame_count, clip.meta.padded_frames)
     return float(clip.depth_valid[:latents].mean() / 255)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from wsm_data.codecs.base import VideoCodec
 from wsm_data.codecs.depth import depth_m_from_latent_video
-from wsm_data.errors import IntegrityError
+from wsm_data.errors import ConfigError
 from wsm_data.schema.arrays import BoolArray, Float64Array, Uint8Array, require_array
 from wsm_data.schema.clip import TEMPORAL_RATIO, Clip
 from wsm_data.view.depth_colours import depth_picture
@@ -46,7 +46,7 @@ def decode_pictures(clip: Clip, codec: VideoCodec, frames: Sequence[int]) -> Cli
     """Decode a clip and keep some frames.
 
     Raises:
-        IntegrityError: the clip was encoded with another codec, whose latents mean something else.
+        ConfigError: the clip was encoded with another codec, whose latents mean something else.
     """
     _require_same_codec(clip, codec)
     chosen = list(frames)
@@ -71,7 +71,7 @@ def _measured(depth_valid: Uint8Array, size: tuple[int, ...]) -> BoolArray:
 def _require_same_codec(clip: Clip, codec: VideoCodec) -> None:
     info, meta = codec.describe(), clip.meta
     if info.digest != meta.codec_digest:
-        raise IntegrityError(
+        raise ConfigError(
             f"clip {meta.key} was encoded with codec {meta.codec} ({meta.codec_digest}) and only that decodes it, "
             f"found {info.name} ({info.digest}); open it with the codec its release names"
         )

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -51,7 +52,7 @@ def draw_contact_sheet(clip: Clip, codec: VideoCodec, path: Path) -> None:
         path: where the PNG goes; replaced atomically.
 
     Raises:
-        IntegrityError: the clip was encoded with another codec.
+        ConfigError: the clip was encoded with another codec.
     """
     pictures = decode_pictures(clip, codec, spread_frames(moving_frames(clip), _COLUMNS * _BANDS))
     with figure_style():
@@ -87,7 +88,7 @@ def _axes(figure: Figure, left_px: float, top_px: float, width_px: float, height
     )
 
 
-def _text(figure: Figure, left_px: float, top_px: float, text: str, **style: object) -> None:
+def _text(figure: Figure, left_px: float, top_px: float, text: str, **style: Any) -> None:
     figure.text(left_px / _WIDTH_PX, 1 - top_px / (figure.get_figheight() * 100), text, va="top", **style)
 
 
@@ -117,7 +118,7 @@ def _draw_band(figure: Figure, clip: Clip, pictures: ClipPictures, shown: Sequen
     depth_top_px = band.top_px + band.row_px + _GAP_PX
     for name, row_top_px in (("RGB", band.top_px), ("depth", depth_top_px)):
         middle = 1 - (row_top_px + band.row_px / 2) / (figure.get_figheight() * 100)
-        style = {"rotation": 90, "va": "center", "ha": "center", "fontsize": 12, "fontweight": "bold"}
+        style: dict[str, Any] = {"rotation": 90, "va": "center", "ha": "center", "fontsize": 12, "fontweight": "bold"}
         figure.text((_MARGIN_PX + _LABEL_PX - 18) / _WIDTH_PX, middle, name, **style)
     for column, index in enumerate(shown):
         left_px = _MARGIN_PX + _LABEL_PX + column * (band.picture_px + _GAP_PX)
@@ -174,7 +175,12 @@ def _finish_time_axes(axes: Axes, clip: Clip) -> None:
         first_still = moving_frames(clip) - 0.5
         axes.axvspan(first_still, last + 0.5, facecolor=GRID, alpha=0.6, lw=0, zorder=0)
         middle = (first_still + last + 0.5) / 2
-        place = {"ha": "center", "va": "center", "rotation": 90, "transform": axes.get_xaxis_transform()}
+        place: dict[str, Any] = {
+            "ha": "center",
+            "va": "center",
+            "rotation": 90,
+            "transform": axes.get_xaxis_transform(),
+        }
         axes.text(middle, 0.5, "still (padding)", color=MUTED, fontsize=10, **place)
     axes.set(xlim=(-0.5, last + 0.5), xlabel="frame number (count)")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))

@@ -49,3 +49,10 @@ def draw_depth_bar(axes: Axes, depth_range: DepthRange) -> None:
     axes.yaxis.set_label_position("right")
     axes.set_ylabel("depth (m)")
     axes.spines[:].set_visible(False)
+
+
+def depth_gradient(stops: int = 9) -> str:
+    """The colour map as a CSS gradient, near at the left."""
+    chosen = _TABLE[np.linspace(0, 255, stops).round().astype(np.intp)]
+    colours = ", ".join(f"rgb({red} {green} {blue})" for red, green, blue in chosen.tolist())
+    return f"linear-gradient(90deg, {colours})"

@@ -1,6 +1,7 @@
 """A map seen from above: what is free, occupied and unknown, the geodesic field, the expert's path and its goal."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib import patheffects
@@ -12,7 +13,9 @@ from matplotlib.patches import Circle, Patch, Rectangle
 from wsm_data.schema.arrays import Float64Array, Uint8Array
 from wsm_data.schema.clip import Clip
 from wsm_data.schema.occupancy import FREE, OCCUPIED, OccupancyGrid
+from wsm_data.shards.names import TRAIN_SPLIT
 from wsm_data.view.clip_facts import clip_field_m, clip_grid, world_path_m
+from wsm_data.view.scene_overview import SceneOverview
 
 FREE_COLOUR = "#ffffff"
 TIGHT_COLOUR = "#f3e6d3"
@@ -20,10 +23,43 @@ OCCUPIED_COLOUR = "#37434d"
 UNKNOWN_COLOUR = "#e6e9ec"
 UNKNOWN_LINES = "#aab4bd"
 PATH_COLOUR = "#c9283e"
+TRAIN_COLOUR = "#1f66b1"
 GOAL_COLOUR = "#00796b"
 MAP_INK = "#1f2a34"  # over the map's own white, so it must not follow a dark theme
 # Dark near the goal, still legible on white far from it.
-_CONTOURS = LinearSegmentedColormap.from_list("distance", ["#0b3c6f", "#7fa9d1"])
+_CONTOUR_ENDS = ("#0b3c6f", "#7fa9d1")
+_CONTOURS = LinearSegmentedColormap.from_list("distance", _CONTOUR_ENDS)
+_UNKNOWN_CSS = f"repeating-linear-gradient(135deg, {UNKNOWN_COLOUR} 0 4px, {UNKNOWN_LINES} 4px 5px)"
+_GOAL_CSS = f"radial-gradient(circle, {GOAL_COLOUR}55 45%, {GOAL_COLOUR} 50% 62%, white 66%)"
+
+
+def _line_css(colour: str, width_px: int) -> str:
+    return f"linear-gradient({colour}, {colour}) center / 100% {width_px}px no-repeat white"
+
+
+MAP_SWATCHES = (
+    ("free", FREE_COLOUR),
+    ("free, but the robot does not fit", TIGHT_COLOUR),
+    ("occupied", OCCUPIED_COLOUR),
+    ("unknown", _UNKNOWN_CSS),
+    ("geodesic distance to the goal (m)", _line_css(_CONTOUR_ENDS[0], 2)),
+    ("expert path", _line_css(PATH_COLOUR, 3)),
+    ("goal region", _GOAL_CSS),
+)
+"""What `draw_map` shows, for a page: labels, each with a CSS background."""
+
+SCENE_SWATCHES = (
+    ("training path", _line_css(TRAIN_COLOUR, 3)),
+    (
+        "held-out path",
+        f"repeating-linear-gradient(90deg, {PATH_COLOUR} 0 5px, white 5px 8px) center / 100% 3px no-repeat white",
+    ),
+    ("free", FREE_COLOUR),
+    ("occupied", OCCUPIED_COLOUR),
+    ("unknown", _UNKNOWN_CSS),
+)
+"""What `draw_scene_map` shows, likewise."""
+
 _MAX_LEVELS = 10
 _NUMBER_GAP_PX = 24
 _STEPS_M = (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
@@ -60,10 +96,18 @@ def draw_map(
     )
     axes.plot(*path_xy_m.T, color=PATH_COLOUR, lw=2.2, solid_capstyle="round", zorder=5)
     axes.plot(*path_xy_m[0], marker="o", ms=6, color=PATH_COLOUR, mec="white", mew=1.2, zorder=6)
-    left, right, bottom, top = _extent_m(grid)
-    axes.set(xlim=(left, right), ylim=(bottom, top), xlabel="world x (m)", ylabel="world y (m)")
-    axes.set_aspect("equal")
-    axes.spines[:].set_visible(True)
+    _frame_axes(axes, grid)
+
+
+def draw_scene_map(axes: Axes, scene: SceneOverview) -> None:
+    """Draw the joined map of a scene with the paths of its clips: training ones full, others dashed on top."""
+    _draw_cells(axes, scene.grid, np.zeros(scene.grid.cells.shape))
+    for path in sorted(scene.paths, key=lambda path: (path.split != TRAIN_SPLIT, path.key)):
+        trained = path.split == TRAIN_SPLIT
+        colour, dashes = (TRAIN_COLOUR, "-") if trained else (PATH_COLOUR, (0, (3, 1.2)))
+        axes.plot(*path.path_xy_m.T, color=colour, ls=dashes, lw=1.5, alpha=0.85, zorder=4)
+        axes.plot(*path.path_xy_m[-1], marker="o", ms=4.5, color=colour, mec="white", mew=0.8, zorder=5)
+    _frame_axes(axes, scene.grid)
 
 
 def draw_clip_map(axes: Axes, clip: Clip) -> None:
@@ -108,7 +152,7 @@ def draw_frame_marks(axes: Axes, path_xy_m: Float64Array, frames: Sequence[int])
 
 def map_key() -> list[Patch | Line2D]:
     """Legend entries for everything `draw_map` draws."""
-    edge = {"edgecolor": MAP_INK, "lw": 0.6}
+    edge: dict[str, Any] = {"edgecolor": MAP_INK, "lw": 0.6}
     return [
         Patch(facecolor=FREE_COLOUR, label="free", **edge),
         Patch(facecolor=TIGHT_COLOUR, label="free, but the robot does not fit", **edge),
@@ -118,6 +162,13 @@ def map_key() -> list[Patch | Line2D]:
         Line2D([], [], color=PATH_COLOUR, lw=2.2, marker="o", mec="white", label="expert path, footprint at start"),
         Line2D([], [], ls="", marker="o", ms=10, mfc=f"{GOAL_COLOUR}55", mec=GOAL_COLOUR, label="goal region"),
     ]
+
+
+def _frame_axes(axes: Axes, grid: OccupancyGrid) -> None:
+    left, right, bottom, top = _extent_m(grid)
+    axes.set(xlim=(left, right), ylim=(bottom, top), xlabel="world x (m)", ylabel="world y (m)")
+    axes.set_aspect("equal")
+    axes.spines[:].set_visible(True)
 
 
 def _extent_m(grid: OccupancyGrid) -> tuple[float, float, float, float]:

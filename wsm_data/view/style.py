@@ -1,10 +1,10 @@
 """How figures look, and how one becomes bytes: no pyplot, no global state, no dependence on a user's matplotlibrc."""
 
 import io
-import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from types import MappingProxyType
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -20,11 +20,7 @@ GRID = "#d9dee3"
 BAR = "#3465a4"
 BAR_SECOND = "#e08a1e"
 
-THEMED: Mapping[str, str] = MappingProxyType(
-    {INK: "var(--ink)", MUTED: "var(--muted)", GRID: "var(--grid)", BAR: "var(--bar)", BAR_SECOND: "var(--bar-second)"}
-)
-"""Colours that the report's style sheet takes over in light, dark and print. Every other colour stays as drawn."""
-
+_NO_METADATA: dict[str, Any] = {"Software": None}  # None takes the entry out; matplotlib's hints allow only text
 _STYLE: Mapping[str, object] = MappingProxyType(
     {
         "axes.axisbelow": True,
@@ -58,10 +54,6 @@ _STYLE: Mapping[str, object] = MappingProxyType(
         "ytick.labelsize": 10,
     }
 )
-_SVG_ROOT = re.compile(r"<svg [^>]*>")
-_SVG_METADATA = re.compile(r"\s*<metadata>.*?</metadata>", re.DOTALL)
-_SVG_NAMESPACE = re.compile(r' xmlns(?::\w+)?="[^"]*"')
-_FONT = re.compile(r"font(?:-family)?: [^;\"]*;?\s*")
 
 
 @contextmanager
@@ -83,12 +75,12 @@ def new_figure(width_px: int, height_px: int) -> Figure:
 def figure_png(figure: Figure) -> bytes:
     """PNG of a figure at one pixel per hundredth of an inch, without a creation date or a program's name."""
     buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=100, facecolor="white", metadata={"Software": None})
+    figure.savefig(buffer, format="png", dpi=100, facecolor="white", metadata=_NO_METADATA)
     return buffer.getvalue()
 
 
 def picture_png(rgb_u8: Uint8Array) -> bytes:
     """PNG of a picture, uint8 [H, W, 3]."""
     buffer = io.BytesIO()
-    imsave(buffer, np.ascontiguousarray(rgb_u8), format="png", metadata={"Software": None})
+    imsave(buffer, np.ascontiguousarray(rgb_u8), format="png", metadata=_NO_METADATA)
     return buffer.getvalue()
