@@ -18,13 +18,13 @@ def encode_clip(clip: Clip) -> tuple[bytes, tuple[Member, ...]]:
     """Tar bytes of a clip, headers and padding included and no end of archive, with the table of its members.
 
     Raises:
-        DataError: `episode.unstorable_name`, the key cannot stand in a tar that webdataset reads.
+        DataError: `episode.unstorable_name`, the key or the names in it cannot be stored.
         ValueError: the key of the meta data is not the key of its id.
     """
     key = clip.meta.key
     if key != clip.meta.id.key:
         raise ValueError(f"the key of a clip must be that of its id, {clip.meta.id.key!r}, found {key!r}")
-    require_key(key)
+    require_key(key, clip.meta.id.text)
     contents: dict[str, memoryview | bytes] = {name: _array_bytes(name, array) for name, array in clip.arrays().items()}
     contents[META] = canonical_json(clip.meta.to_json()).encode()
     members = lay_out(
@@ -66,6 +66,8 @@ def decode_clip(data: memoryview, members: Sequence[Member], where: str) -> Clip
         arrays = {member.name: _view(data, member) for member in members if member.name != META}
         meta = next(member for member in members if member.name == META)
         record = json.loads(bytes(content_of(data, meta)))
+        if not isinstance(record, dict):
+            raise ValueError(f"meta.json must hold an object, found {type(record).__name__}")
         return Clip(meta=ClipMeta.from_json(record), **arrays)
     except (ValueError, TypeError, KeyError) as error:
         raise IntegrityError(f"{where}: the members must form a valid clip, but: {error}") from error

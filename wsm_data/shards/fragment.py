@@ -94,11 +94,9 @@ def build_fragment(clip: Clip) -> Fragment:
     """Serialise a clip; equal clips give equal bytes.
 
     Raises:
-        DataError: `episode.unstorable_name`, the key cannot stand in a tar that webdataset reads.
-        ValueError: the key of the meta data is not the key of its id, or its frame counts disagree with the arrays.
+        DataError: `episode.unstorable_name`, the key or the names in it cannot be stored.
+        ValueError: the key of the meta data is not the key of its id.
     """
-    if clip.meta.frames != clip.frame_count:
-        raise ValueError(f"{clip.meta.key}: meta says {clip.meta.frames} frames, the poses have {clip.frame_count}")
     data, members = encode_clip(clip)
     rgb_sums, depth_sums = clip_sums(clip)
     info = FragmentInfo(

@@ -71,7 +71,10 @@ class InventoryRow:
 
 def write_inventory(path: Path, rows: Iterable[InventoryRow]) -> None:
     """Write the inventory atomically, sorted by unit."""
-    records = [asdict(row) for row in sorted(rows, key=lambda row: (row.unit, row.container, row.state, row.reason))]
+    records = [
+        asdict(row) | {"unit": printable(row.unit), "container": printable(row.container)}
+        for row in sorted(rows, key=lambda row: (row.unit, row.container, row.state, row.reason))
+    ]
     with atomic_file(path) as file:
         pq.write_table(
             pa.Table.from_pylist(records, schema=_SCHEMA), file, compression="zstd", write_page_checksum=True
@@ -104,7 +107,8 @@ def write_quarantine(path: Path, refusals: Iterable[Mapping[str, object]]) -> No
         if not refusal.get("unit") or not refusal.get("reason"):
             raise ValueError(f"a refusal must name its unit and reason, found {dict(refusal)}")
         kept = {key: value for key, value in refusal.items() if key not in _TIME_FIELDS}
-        lines.append((str(refusal["unit"]), canonical_json(kept)))
+        kept["unit"] = printable(str(refusal["unit"]))
+        lines.append((kept["unit"], canonical_json(kept)))
     write_bytes(path, b"".join(line.encode() + b"\n" for _, line in sorted(lines)))
 
 
@@ -124,6 +128,11 @@ def parse_quarantine(data: bytes, where: str) -> tuple[dict[str, object], ...]:
     except ValueError as error:
         raise IntegrityError(f"{where} must list the refusals of a release, but: {error}; restore the file") from error
     return records
+
+
+def printable(name: str) -> str:
+    """A name as the release spells it: what is not valid UTF-8 in the name of a file is escaped."""
+    return name.encode(errors="backslashreplace").decode()
 
 
 def count_reasons(rows: Sequence[InventoryRow]) -> dict[str, int]:

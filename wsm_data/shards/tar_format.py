@@ -26,8 +26,12 @@ _KEY_PART = re.compile(r"[A-Za-z0-9_%-]+")
 _SKIPPED_BY_WEBDATASET = re.compile(r"__[^/]*__(/|$)")
 
 
-def require_key(key: str) -> None:
+def require_key(key: str, text: str) -> None:
     """Check that stock webdataset reads samples under this key, and that it can name a file.
+
+    Args:
+        key: key of a clip.
+        text: the id it was made of, which stands in the index as UTF-8.
 
     Raises:
         DataError: `episode.unstorable_name`; the trajectory must be renamed at its source.
@@ -39,6 +43,8 @@ def require_key(key: str) -> None:
             raise _unstorable(key, f"has the part {part!r}; parts hold letters, digits, '_', '-' and '%' only")
         if len(part) > MAX_KEY_PART_BYTES:
             raise _unstorable(key, f"has a part of {len(part)} bytes, at most {MAX_KEY_PART_BYTES} are allowed")
+    if any("\ud800" <= letter <= "\udfff" for letter in text):  # what Python makes of bytes that are not UTF-8
+        raise _unstorable(key, f"is made of {text!r}, which is not valid UTF-8")
     if _SKIPPED_BY_WEBDATASET.match(key):
         raise _unstorable(key, "starts with a name of the form __name__, which webdataset passes over")
 

@@ -1,6 +1,6 @@
 """Small valid clips, and a release of six of them in three scenes."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -25,7 +25,8 @@ WIDTH_PX, HEIGHT_PX = 160, 96  # latents of 10 x 6 cells with a spatial ratio of
 RESOLUTION_M = 0.05
 
 
-def _meta(unit: str, frames: int, rows: int, columns: int, **changes: object) -> ClipMeta:
+def _meta(unit: str, shape: tuple[int, int, int], changes: Mapping[str, object]) -> ClipMeta:
+    frames, rows, columns = shape
     goal = ((columns - 0.5) * RESOLUTION_M, (rows - 0.5) * RESOLUTION_M, 0.5)  # centre of the last cell
     values = {
         "key": EpisodeId.parse(unit).key,
@@ -52,7 +53,7 @@ def _meta(unit: str, frames: int, rows: int, columns: int, **changes: object) ->
         "depth_range": DepthRange(),
         "notes": ("episode.length_mismatch",),
     }
-    return ClipMeta(**(values | changes))
+    return ClipMeta(**(values | dict(changes)))
 
 
 def build_clip(unit: str = "synth_d435i/home_0001/000003", *, latents: int = 3, **changes: object) -> Clip:
@@ -70,7 +71,7 @@ def build_clip(unit: str = "synth_d435i/home_0001/000003", *, latents: int = 3, 
     geodesic_mm[-1, -1] = 0
     shape = (latents, 48, HEIGHT_PX // 16, WIDTH_PX // 16)
     return Clip(
-        meta=_meta(unit, frames, rows, columns, **changes),
+        meta=_meta(unit, (frames, rows, columns), changes),
         rgb_latent=rng.normal(size=shape).astype(np.float16),
         depth_latent=rng.normal(2.0, 3.0, size=shape).astype(np.float16),
         depth_valid=rng.integers(0, 256, size=(latents, *shape[2:]), dtype=np.uint8),
