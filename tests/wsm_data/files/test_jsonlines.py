@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wsm_data.errors import IntegrityError
-from wsm_data.files.jsonlines import append_line, canonical_json, drop_torn_line, read_lines, write_lines
+from wsm_data.files.jsonlines import canonical_json, drop_torn_line, line_appender, read_lines, write_lines
 
 SCALARS = st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text()
 JSON_VALUES = st.recursive(
@@ -48,15 +48,41 @@ def test_numbers_that_json_does_not_have_are_refused(number):
 
 def test_a_file_name_that_is_not_utf_8_can_be_written_and_read_back(tmp_path):
     name = os.fsdecode(b"scene_\xff")
-    append_line(tmp_path / "a.jsonl", {"source": name})
+    with line_appender(tmp_path / "a.jsonl") as append:
+        append({"source": name})
     assert list(read_lines(tmp_path / "a.jsonl")) == [{"source": name}]
 
 
 def test_appended_lines_are_read_in_order(tmp_path):
     path = tmp_path / "new" / "a.jsonl"
-    for number in range(3):
-        append_line(path, {"n": number})
+    with line_appender(path) as append:
+        append({"n": 0})
+        append({"n": 1})
+    with line_appender(path) as append:
+        append({"n": 2})
     assert list(read_lines(path)) == [{"n": 0}, {"n": 1}, {"n": 2}]
+
+
+def test_an_appended_line_survives_the_death_of_its_writer(tmp_path):
+    path = tmp_path / "a.jsonl"
+    program = (
+        "import os, sys; from pathlib import Path; from wsm_data.files.jsonlines import line_appender\n"
+        "with line_appender(Path(sys.argv[1])) as append:\n    append({'n': 1})\n    os.kill(os.getpid(), 9)"
+    )
+    assert subprocess.run([sys.executable, "-c", program, str(path)]).returncode == -9
+    assert list(read_lines(path)) == [{"n": 1}]
+
+
+def test_appended_lines_are_brought_to_disk_now_and_then_and_at_the_end(tmp_path, monkeypatch):
+    times = iter([0.0, 0.1, 0.15, 0.25, 0.25, 0.3])  # opening, two lines, a late line asks twice, one more line
+    monkeypatch.setattr("time.monotonic", lambda: next(times))
+    synced = []
+    monkeypatch.setattr(os, "fsync", lambda _: synced.append(path.read_bytes().count(b"\n")))
+    path = tmp_path / "a.jsonl"
+    with line_appender(path) as append:
+        for number in range(4):
+            append({"n": number})
+    assert synced == [3, 4]
 
 
 @given(records=st.lists(st.dictionaries(st.text(), JSON_VALUES, max_size=3), max_size=5))
@@ -68,7 +94,8 @@ def test_written_records_are_read_back(tmp_path_factory, records):
 
 def test_a_line_break_inside_a_text_does_not_break_the_line(tmp_path):
     record = {"message": "first\nsecond\r\n\u2028third"}
-    append_line(tmp_path / "a.jsonl", record)
+    with line_appender(tmp_path / "a.jsonl") as append:
+        append(record)
     assert (tmp_path / "a.jsonl").read_bytes().count(b"\n") == 1
     assert list(read_lines(tmp_path / "a.jsonl")) == [record]
 
@@ -96,7 +123,8 @@ def test_after_the_torn_line_is_dropped_an_append_stands_alone(tmp_path, content
     path.write_bytes(content)
     whole = list(read_lines(path))
     drop_torn_line(path)
-    append_line(path, {"n": 9})
+    with line_appender(path) as append:
+        append({"n": 9})
     assert list(read_lines(path)) == [*whole, {"n": 9}]
 
 
@@ -108,7 +136,8 @@ def test_dropping_the_torn_line_of_a_file_that_does_not_exist_makes_none(tmp_pat
 def test_an_append_after_a_torn_line_that_was_not_dropped_is_noticed(tmp_path):
     path = tmp_path / "a.jsonl"
     path.write_bytes(b'{"n":1}\n{"n":')
-    append_line(path, {"n": 3})
+    with line_appender(path) as append:
+        append({"n": 3})
     with pytest.raises(IntegrityError, match=r"a\.jsonl:2 "):
         list(read_lines(path))
 
@@ -133,8 +162,9 @@ def test_a_line_that_is_json_but_no_object_is_refused(tmp_path, line, found):
 def test_lines_appended_by_two_processes_at_once_stay_whole(tmp_path):
     path = tmp_path / "a.jsonl"
     program = (
-        "import sys; from pathlib import Path; from wsm_data.files.jsonlines import append_line\n"
-        "for n in range(40): append_line(Path(sys.argv[1]), {'writer': sys.argv[2], 'n': n, 'long': 'x' * 20_000})"
+        "import sys; from pathlib import Path; from wsm_data.files.jsonlines import line_appender\n"
+        "with line_appender(Path(sys.argv[1])) as append:\n"
+        "    for n in range(40): append({'writer': sys.argv[2], 'n': n, 'long': 'x' * 20_000})"
     )
     children = [subprocess.Popen([sys.executable, "-c", program, str(path), name]) for name in ("a", "b")]
     assert [child.wait() for child in children] == [0, 0]

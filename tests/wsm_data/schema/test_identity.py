@@ -57,6 +57,10 @@ def test_a_folder_name_that_is_not_utf_8_has_a_key_of_its_own():
     assert undecodable.key != question_mark.key
 
 
+def test_undecodable_bytes_are_told_from_the_letter_that_they_would_spell():
+    assert EpisodeId("g", "\udcc3\udca9", "e").key != EpisodeId("g", "\u00e9", "e").key
+
+
 @pytest.mark.parametrize("scene", ["plain", "with.two.dots", "with space", "100%", "küche"])
 def test_stock_webdataset_reads_the_key_back(tmp_path, scene):
     key = EpisodeId("gibson_zed", scene, "trajectory_7").key
