@@ -23,7 +23,7 @@ check: $(VENV)/.ready-dev
 	$(BIN)/lint-imports
 
 bench: $(VENV)/.ready-bench
-	@set -e; for program in bench/*.py; do echo "$$program"; $(BIN)/python "$$program"; done
+	@set -e; for program in $$(grep -l __main__ bench/*.py); do echo "$$program"; $(BIN)/python "$$program"; done
 
 clean:
 	rm -rf $(VENV) runs
