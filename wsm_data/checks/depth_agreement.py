@@ -60,8 +60,8 @@ def check_depth_agreement(
 
     Args:
         record: the trajectory.
-        depth_m: by frame, depth along the optical axis at the size of the record's intrinsics, m, 0 without measurement;
-            float32 [H, W]. Frames about half a metre apart tell most.
+        depth_m: by frame, depth along the optical axis at the size of the record's intrinsics, m, 0 without
+            measurement; float32 [H, W]. Frames about half a metre apart tell most.
         camera_axes: the axes the source's manifest says its poses are stored in, `opengl` or `opencv`.
         config: limits.
     """

@@ -1,0 +1,56 @@
+import dataclasses
+
+import pytest
+
+from wsm_data.checks.intrinsics_fit import check_intrinsics_fit
+from wsm_data.errors import Reason
+from wsm_data.schema.camera import Intrinsics
+from wsm_data.schema.dataset import CameraModel
+
+
+def verdict_of(make_record, dataset, **changes):
+    record = make_record()
+    return check_intrinsics_fit(
+        make_record(intrinsics=dataclasses.replace(record.intrinsics, **changes)), dataset.cameras
+    )
+
+
+def test_the_published_camera_fits(make_record, dataset):
+    verdict = check_intrinsics_fit(make_record(), dataset.cameras)
+    assert verdict.keep
+    assert verdict.measured["published_error"] == 0
+    assert verdict.measured["field_of_view_deg"] == pytest.approx(68.0, abs=0.1)  # 2 atan(240 / 355.81)
+
+
+@pytest.mark.parametrize("change", [{"fx": 380.0}, {"fy": 370.0}, {"cx": 262.0}, {"cy": 147.0}])
+def test_deviations_from_the_published_camera_are_refused(make_record, dataset, change):
+    verdict = verdict_of(make_record, dataset, **change)
+    assert verdict.reason is Reason.INTRINSICS_MISFIT
+    assert "published_error" in verdict.message
+
+
+@pytest.mark.parametrize("change", [{"fx": 358.0}, {"cx": 243.0}])
+def test_a_calibration_within_a_few_per_cent_is_kept(make_record, dataset, change):
+    assert verdict_of(make_record, dataset, **change).keep
+
+
+@pytest.mark.parametrize(
+    ("intrinsics", "what"),
+    [
+        (Intrinsics(fx=476.6, fy=476.6, cx=319.5, cy=179.5, width=480, height=270), "centre_offset"),  # of 640 x 360
+        (Intrinsics(fx=60.0, fy=60.0, cx=320.0, cy=180.0, width=640, height=360), "field_of_view_deg"),
+        (Intrinsics(fx=4000.0, fy=4000.0, cx=320.0, cy=180.0, width=640, height=360), "field_of_view_deg"),
+        (Intrinsics(fx=476.0, fy=600.0, cx=320.0, cy=180.0, width=640, height=360), "aspect_error"),
+    ],
+)
+def test_an_implausible_camera_is_refused_without_a_published_one(make_record, intrinsics, what):
+    verdict = check_intrinsics_fit(make_record(intrinsics=intrinsics), {})
+    assert verdict.reason is Reason.INTRINSICS_MISFIT
+    assert what in verdict.message
+
+
+def test_a_published_camera_of_another_size_or_without_numbers_says_nothing(make_record, dataset):
+    halved = make_record(intrinsics=make_record().intrinsics.resized(240, 135))
+    assert "published_error" not in check_intrinsics_fit(halved, dataset.cameras).measured
+    sized = {"d435i": CameraModel(width=480, height=270)}
+    assert check_intrinsics_fit(make_record(), sized).measured["published_error"] == 0

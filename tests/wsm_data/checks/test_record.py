@@ -1,0 +1,24 @@
+import dataclasses
+
+from wsm_data.checks.record import RECORD_CHECKS, check_record
+from wsm_data.errors import Reason
+
+
+def test_a_sound_record_passes_every_check(make_record, dataset):
+    verdicts = check_record(make_record(), dataset)
+    assert len(verdicts) == len(RECORD_CHECKS)
+    assert all(verdict.keep and verdict.measured for verdict in verdicts)
+
+
+def test_all_faults_of_a_record_are_told_in_a_fixed_order(make_record, dataset):
+    record = make_record(frames=4, height_m=3.0, step_m=0.01)
+    poses = record.T_world_camera.copy()
+    poses[2:, 0, 3] += 5
+    wide = dataclasses.replace(record.intrinsics, fx=500.0)
+    record = dataclasses.replace(record, T_world_camera=poses, intrinsics=wide)
+    assert [verdict.reason for verdict in check_record(record, dataset)] == [
+        Reason.EPISODE_TOO_SHORT,
+        Reason.INTRINSICS_MISFIT,
+        Reason.MOUNT_MISFIT,
+        Reason.POSE_JUMP,
+    ]

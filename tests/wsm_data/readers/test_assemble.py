@@ -1,0 +1,57 @@
+import hashlib
+
+import numpy as np
+import pytest
+
+from wsm_data.errors import DataError, Reason
+from wsm_data.readers.assemble import build_record, digest_frames, episode_numbers
+from wsm_data.readers.contents import FolderContents, ImageFacts
+from wsm_data.readers.table import EpisodeTable
+from wsm_data.schema.dataset import DatasetManifest
+from wsm_data.schema.depth import DepthEncoding
+from wsm_data.schema.identity import EpisodeId
+
+ID = EpisodeId("gibson_zed", "scene", "000004")
+
+
+def folder_of(T_mount, poses):
+    """Contents of one episode, number 4, without any file behind it."""
+    K = np.array([[20.0, 0, 15.5], [0, 20, 11.5], [0, 0, 1]])
+    images = {(4, t): ImageFacts(f"{t}", (32, 24), f"{t:032x}", None) for t in range(len(poses))}
+    table = EpisodeTable(K=K, T_mount=T_mount, T_world_stored=poses)
+    return FolderContents(tables={4: table}, rgb=dict(images), depth=dict(images))
+
+
+def dataset_of(axes):
+    encoding = DepthEncoding(metres_per_unit=1e-4, invalid_codes=(0,))
+    return DatasetManifest(name="d", licence="l", depth=encoding, camera_axes=axes)
+
+
+@pytest.mark.parametrize("pitch_deg", [0.0, 15.0, 30.0, -10.0])
+def test_pitch_and_height_are_read_from_the_mount_of_the_source(pitch_deg):
+    """Rx(90 deg - pitch), z = height in OpenGL axes; the same mount in OpenCV axes is that times diag(1, -1, -1)."""
+    angle = np.deg2rad(90 - pitch_deg)
+    opengl = np.eye(4)
+    opengl[1:3, 1:3] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+    opengl[2, 3] = 0.7
+    for axes, mount in (("opengl", opengl), ("opencv", opengl @ np.diag([1.0, -1, -1, 1]))):
+        record, _ = build_record(ID, "c", folder_of(mount, np.stack([mount] * 5)), 4, dataset_of(axes))
+        assert np.rad2deg(record.camera_pitch_rad) == pytest.approx(pitch_deg, abs=1e-9)
+        assert record.camera_height_m == 0.7
+        assert record.floor_z_m == 0.0
+        forward = record.T_world_camera[0, :3, 2]
+        assert forward == pytest.approx([0, np.cos(np.deg2rad(pitch_deg)), -np.sin(np.deg2rad(pitch_deg))], abs=1e-12)
+
+
+def test_the_digest_of_frames_goes_by_time_and_tells_colour_from_depth():
+    assert digest_frames(["a", "b"], ["c", "d"]) == hashlib.sha256(b"acbd").hexdigest()
+    assert digest_frames(["a", "b"], ["c", "d"]) != digest_frames(["b", "a"], ["c", "d"])
+
+
+def test_images_of_an_episode_without_a_table_make_it_known():
+    folder = folder_of(np.eye(4), np.stack([np.eye(4)] * 5))
+    folder.rgb[9, 0] = folder.rgb[4, 0]
+    assert episode_numbers(folder) == [4, 9]
+    with pytest.raises(DataError) as caught:
+        build_record(ID, "c", folder, 9, dataset_of("opengl"))
+    assert caught.value.reason is Reason.TABLE_UNREADABLE

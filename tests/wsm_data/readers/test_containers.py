@@ -1,0 +1,93 @@
+import os
+
+import pytest
+
+from wsm_data.errors import ConfigError
+from wsm_data.readers.containers import Layout, find_containers
+
+
+def find(source, dataset):
+    return {container.id: container for container in find_containers(source, dataset)}
+
+
+def test_mixed_layouts_in_one_tree_are_all_found(build, tmp_path, dataset):
+    episode = build.episode(0)
+    build.write_archive(tmp_path, build.scene_files({0: episode}))
+    build.write_scene_folder(tmp_path, build.scene_files({0: episode}))
+    build.write_trajectories(tmp_path, {"trajectory_01": build.trajectory_files(episode)})
+    found = find(tmp_path, dataset)
+    assert [(id_, container.layout) for id_, container in found.items()] == [
+        ("gibson_d435i/Acker.ville", Layout.SCENE_FOLDER),
+        ("gibson_d435i/Acker.ville.tar.gz", Layout.SCENE_ARCHIVE),
+        ("gibson_d435i/Acker.ville/trajectory_01", Layout.TRAJECTORY_FOLDER),
+    ]
+    assert {(container.group, container.scene) for container in found.values()} == {("gibson_d435i", "Acker.ville")}
+    assert found["gibson_d435i/Acker.ville/trajectory_01"].episode == "trajectory_01"
+
+
+def test_a_scene_of_trajectory_folders_alone_is_no_scene_folder(build, tmp_path, dataset):
+    build.write_trajectories(tmp_path, {"trajectory_01": build.trajectory_files(build.episode(0))})
+    assert list(find(tmp_path, dataset)) == ["gibson_d435i/Acker.ville/trajectory_01"]
+
+
+def test_what_is_none_of_the_layouts_is_listed_and_not_passed_over(tmp_path, dataset):
+    (tmp_path / "group" / "empty_scene").mkdir(parents=True)
+    (tmp_path / "group" / "half" / "strange").mkdir(parents=True)
+    (tmp_path / "group" / "plain.tar").write_bytes(b"")
+    (tmp_path / "group" / "other.zip").write_bytes(b"")
+    assert list(find(tmp_path, dataset)) == [
+        "group/empty_scene",
+        "group/half/strange",
+        "group/other.zip",
+        "group/plain.tar",
+    ]
+
+
+def test_hidden_names_and_loose_files_are_not_containers(build, tmp_path, dataset):
+    build.write_archive(tmp_path, {})
+    (tmp_path / ".cache" / "scene").mkdir(parents=True)
+    (tmp_path / "gibson_d435i" / ".part.tar.gz").write_bytes(b"")
+    (tmp_path / "gibson_d435i" / "README.md").write_text("")
+    (tmp_path / "README.md").write_text("")
+    assert list(find(tmp_path, dataset)) == ["gibson_d435i/Acker.ville.tar.gz"]
+
+
+@pytest.mark.parametrize("make", ["nothing", "file", "empty", "empty_group"])
+def test_an_absent_or_empty_source_is_a_wrong_request(tmp_path, dataset, make):
+    source = tmp_path / "source"
+    if make == "file":
+        source.write_text("")
+    elif make != "nothing":
+        (source / ("group" if make == "empty_group" else "")).mkdir(parents=True)
+    with pytest.raises(ConfigError, match="source"):
+        find_containers(source, dataset)
+
+
+def test_the_signature_tells_touched_from_untouched(build, tmp_path, dataset):
+    build.write_scene_folder(tmp_path, build.scene_files({0: build.episode(0)}))
+    build.write_trajectories(tmp_path, {"trajectory_01": build.trajectory_files(build.episode(1))})
+    before = find(tmp_path, dataset)
+    assert before == find(tmp_path, dataset)
+    image = tmp_path / "gibson_d435i/Acker.ville" / build.rgb_folder / "episode_000000_000.jpg"
+    status = image.stat()
+    os.utime(image, ns=(status.st_atime_ns, status.st_mtime_ns + 1))
+    after = find(tmp_path, dataset)
+    changed = [id_ for id_ in before if before[id_] != after[id_]]
+    assert changed == ["gibson_d435i/Acker.ville"]  # not the trajectory beside it
+
+
+@pytest.mark.parametrize("change", ["append", "add", "remove"])
+def test_the_signature_sees_sizes_and_names(build, tmp_path, dataset, change):
+    build.write_scene_folder(tmp_path, build.scene_files({0: build.episode(0)}))
+    before = find(tmp_path, dataset)
+    meta = tmp_path / "gibson_d435i/Acker.ville/meta"
+    info = meta / "info.json"
+    status = info.stat()
+    if change == "append":
+        info.write_bytes(b"{ }")
+        os.utime(info, ns=(status.st_atime_ns, status.st_mtime_ns))
+    elif change == "add":
+        (meta / "more.json").write_bytes(b"")
+    else:
+        info.unlink()
+    assert find(tmp_path, dataset) != before
