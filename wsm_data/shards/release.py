@@ -86,12 +86,18 @@ class Release:
             data = self.store.read_range(row.shard, row.clip_offset, row.clip_size)
         except FileNotFoundError as error:
             raise IntegrityError(f"{where}: the shard is missing from {self.store.root}; fetch it again") from error
+        except OSError:
+            self._require_long_enough(row, where)  # some stores fail where a range starts behind the end
+            raise
         if len(data) != row.clip_size:
-            raise IntegrityError(
-                f"{where}: the clip must have {row.clip_size} bytes at {row.clip_offset}, found {len(data)}; the shard "
-                "is cut, fetch it again"
-            )
+            self._require_long_enough(row, where)
+            raise IntegrityError(f"{where}: {len(data)} bytes were read of {row.clip_size}; read it again")
         return data
+
+    def _require_long_enough(self, row: IndexRow, where: str) -> None:
+        found, end = self.store.size_bytes(row.shard), row.clip_offset + row.clip_size
+        if found < end:
+            raise IntegrityError(f"{where}: the clip must end at byte {end}, but the shard has {found}; fetch it again")
 
 
 def open_release(location: str | Path) -> Release:

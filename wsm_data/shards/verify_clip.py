@@ -130,8 +130,8 @@ def _map(clip: Clip, row: IndexRow) -> Iterator[Finding]:
 
 
 def _arrival(clip: Clip, row: IndexRow) -> Iterator[Finding]:
-    last, least = float(clip.expert_distance[-1]), float(clip.expert_distance.min())
-    if last > ARRIVED_M or least < 0:
+    last, least = clip.expert_distance[-1], clip.expert_distance.min()
+    if last > np.float32(ARRIVED_M) or least < 0:
         message = f"expert_distance must not be negative and end within {ARRIVED_M} m of 0, found least {least:.4f}"
         yield _finding(FindingKind.CLIP_GOAL, row, f"{message} and last {last:.4f} m; encode it again")
     if not (clip.geodesic_mm[_near_goal(clip)] == 0).any():

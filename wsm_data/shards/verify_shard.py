@@ -48,6 +48,7 @@ class _HashingReader:
         self._digest = hashlib.sha256()
         self._block = memoryview(b"")
         self._fetched = 0
+        self._size = store.size_bytes(name)
 
     def read(self, size: int) -> memoryview:
         """The next `size` bytes, fewer at the end of the file; without a copy where they lie in one block."""
@@ -73,12 +74,13 @@ class _HashingReader:
         return self._digest.hexdigest()
 
     def _fetch(self) -> bool:
+        if self._fetched >= self._size:  # some stores fail where a range starts at the end
+            return False
         data = self._store.read_range(self._name, self._fetched, _READ_BYTES)
         self._digest.update(data)
         self._fetched += len(data)
         self._block = memoryview(data)
-        if data:
-            self._on_progress(len(data))
+        self._on_progress(len(data))
         return bool(data)
 
 

@@ -1,0 +1,48 @@
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from wsm_data.errors import IntegrityError
+from wsm_data.schema.clip import Clip
+from wsm_data.shards.fragment import build_fragment
+from wsm_data.shards.index_row import SCHEMA, IndexRow, index_row, parse_row, row_record
+
+
+@pytest.fixture
+def row(make_clip: Callable[..., Clip]) -> IndexRow:
+    info = build_fragment(make_clip(padded_frames=3)).info
+    return index_row(info, split="train", shard="train-000004.tar", position=2, clip_offset=1536)
+
+
+def test_a_row_says_what_the_clip_is(row: IndexRow) -> None:
+    assert (row.key, row.unit) == ("synth_d435i/home_0001/000003",) * 2
+    assert (row.group, row.scene, row.episode) == ("synth_d435i", "home_0001", "000003")
+    assert (row.physical_scene, row.camera, row.dataset) == ("synth/home_0001", "d435i", "synthetic")
+    assert (row.latents, row.frames, row.padded_frames, row.codec_digest) == (3, 9, 3, "c0dec")
+
+
+def test_offsets_count_from_the_start_of_the_shard(row: IndexRow) -> None:
+    assert row.members[0].header_offset == 1536
+    assert row.members_in_clip[0].header_offset == 0
+    assert row.members[-1].end_offset == 1536 + row.clip_size
+
+
+def test_a_row_survives_its_columns(row: IndexRow) -> None:
+    record = row_record(row)
+    assert set(record) == set(SCHEMA.names)
+    assert parse_row(record) == row
+
+
+def test_the_largest_checksum_fits(row: IndexRow) -> None:
+    largest = replace(row, members=tuple(replace(member, checksum="f" * 16) for member in row.members))
+    assert parse_row(row_record(largest)) == largest
+
+
+@pytest.mark.parametrize(
+    ("column", "value"),
+    [("poses_offset", 64), ("poses_size", 1), ("clip_size", 512), ("frames", 13), ("latents", -1), ("meta_size", None)],
+)
+def test_a_row_that_contradicts_itself_is_refused(row: IndexRow, column: str, value: object) -> None:
+    with pytest.raises(IntegrityError, match=r"train-000004\.tar, clip synth_d435i/home_0001/000003: its row"):
+        parse_row(row_record(row) | {column: value})
