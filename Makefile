@@ -4,7 +4,8 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-PIP := $(BIN)/python -m pip -qq --disable-pip-version-check
+# Byte code is left to the first import of a module: most modules that are installed are never imported.
+INSTALL := $(BIN)/python -m pip -qq --disable-pip-version-check install --no-compile
 DEMO_OUT ?= runs/demo
 
 .PHONY: demo test check bench clean
@@ -32,22 +33,22 @@ clean:
 # its own; its version, like every other, stands in constraints.txt alone.
 $(VENV)/.ready: $(VENV)/.torch pyproject.toml
 	@echo "installing wsm"
-	@$(PIP) install -c constraints.txt -e .
+	@$(INSTALL) -c constraints.txt -e .
 	@touch $@
 
 $(VENV)/.ready-dev: $(VENV)/.torch pyproject.toml
 	@echo "installing wsm with its development tools"
-	@$(PIP) install -c constraints.txt -e '.[dev]'
+	@$(INSTALL) -c constraints.txt -e '.[dev]'
 	@touch $(VENV)/.ready $@
 
 $(VENV)/.ready-bench: $(VENV)/.torch pyproject.toml
 	@echo "installing wsm with the peers it is measured against"
-	@$(PIP) install -c constraints.txt -e '.[bench]'
+	@$(INSTALL) -c constraints.txt -e '.[bench]'
 	@touch $(VENV)/.ready $@
 
 $(VENV)/.torch: $(VENV)/.made constraints.txt
 	@echo "installing torch"
-	@$(PIP) install "$$(grep '^torch==' constraints.txt)"
+	@$(INSTALL) "$$(grep '^torch==' constraints.txt)"
 	@touch $@
 
 $(VENV)/.made:
