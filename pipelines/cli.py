@@ -11,6 +11,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
+from pipelines.engines.choice import EngineName
 from pipelines.registry import STAGES, StageEntry
 from wsm_data.errors import WsmError
 
@@ -59,6 +60,10 @@ _OPTIONS: dict[str, tuple[Any, Any]] = {
         None,
     ),
     "workers": (Annotated[int, typer.Option("--workers", "-w", min=0, help="Worker processes; 0: one a core.")], 0),
+    "engine": (
+        Annotated[EngineName, typer.Option("--engine", help="Where workers run: this machine, ray or Slurm.")],
+        EngineName.LOCAL,
+    ),
     "limit": (Annotated[int, typer.Option("--limit", min=0, help="At most this many pending units; 0: all.")], 0),
     "only": (
         Annotated[

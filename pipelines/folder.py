@@ -3,7 +3,7 @@
 import fcntl
 import json
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +12,7 @@ from typing import Any
 from pipelines.stage import Outcome
 from wsm_data.errors import ConfigError, IntegrityError, Reason
 from wsm_data.files.atomic import write_text
-from wsm_data.files.jsonlines import append_line, drop_torn_line, read_lines, write_lines
+from wsm_data.files.jsonlines import canonical_json, drop_torn_line, line_appender, read_lines, write_lines
 from wsm_data.schema.verdict import Refusal
 
 STAGE_FILE, LEDGER_FILE = "stage.json", "ledger.jsonl"
@@ -80,15 +80,24 @@ def write_stage_record(folder: Path, record: StageRecord) -> None:
 
 def read_ledger(folder: Path) -> dict[str, LedgerEntry]:
     """The last entry of every unit."""
-    return {
-        str(line["unit"]): LedgerEntry(key=str(line["key"]), outcome=_outcome_from_line(line))
-        for line in read_lines(folder / LEDGER_FILE)
-    }
+    return {str(line["unit"]): _entry_from_line(line) for line in read_lines(folder / LEDGER_FILE)}
 
 
-def append_ledger(folder: Path, entry: LedgerEntry) -> None:
-    """Add the outcome of one unit; on disk when the call returns."""
-    append_line(folder / LEDGER_FILE, {**_ledger_line(entry), "time": round(time.time(), 3)})
+@contextmanager
+def ledger_appender(folder: Path) -> Iterator[Callable[[LedgerEntry], LedgerEntry]]:
+    """Open the ledger for more outcomes; yields the function that adds one, which then survives a kill.
+
+    That function returns the entry as a later run reads it (a tuple among the facts is a list by then), so that what
+    follows cannot depend on whether the run was cut short.
+    """
+    with line_appender(folder / LEDGER_FILE) as append_line:
+
+        def append(entry: LedgerEntry) -> LedgerEntry:
+            line = {**_ledger_line(entry), "time": round(time.time(), 3)}
+            append_line(line)
+            return _entry_from_line(json.loads(canonical_json(line)))
+
+        yield append
 
 
 def compact_ledger(folder: Path, entries: Mapping[str, LedgerEntry]) -> None:
@@ -173,8 +182,8 @@ def locked(folder: Path) -> Iterator[None]:
         yield
 
 
-def _outcome_from_line(line: Mapping[str, Any]) -> Outcome:
-    return Outcome(
+def _entry_from_line(line: Mapping[str, Any]) -> LedgerEntry:
+    outcome = Outcome(
         unit=line["unit"],
         state=line["state"],
         digest=line["digest"],
@@ -183,3 +192,4 @@ def _outcome_from_line(line: Mapping[str, Any]) -> Outcome:
         refusals=tuple(refusal_from_json(record) for record in line["refusals"]),
         seconds=line["seconds"],
     )
+    return LedgerEntry(key=line["key"], outcome=outcome)

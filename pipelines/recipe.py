@@ -1,17 +1,18 @@
 """Recipes: a named list of stages with differences from their defaults, wired into one run folder."""
 
 import difflib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-from pipelines.config import build_config, load_toml, merge
+from pipelines.config import build_config, convert, load_toml, merge
 from pipelines.registry import STAGES, load_stage
 from wsm_data.errors import ConfigError
 
 _FOLDER = Path(__file__).parent / "recipes"
 _NAMES = tuple(entry.name for entry in STAGES)
+_KEYS: dict[str, Any] = {"stages": tuple[str, ...], "source": str, "summary": str}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,13 +40,27 @@ def load_recipe(name: str, config: Path | None, changes: Mapping[str, Any]) -> R
     if config is not None:
         values = merge(values, load_toml(config))
     values = merge(values, changes)
-    stages = tuple(values.pop("stages", ()))
-    source = str(values.pop("source", ""))
-    values.pop("summary", None)
-    unknown = [one for one in (*stages, *values) if one not in _NAMES]
-    if unknown or not stages:
-        raise ConfigError(_unknown_section(unknown, name))
-    return Recipe(stages=tuple(one for one in _NAMES if one in stages), settings=values, source=source)
+    settings = stage_sections(values, f"recipe {name}")
+    top = {key: convert(kind, values[key], key) for key, kind in _KEYS.items() if key in values}
+    stages = top.get("stages", ())
+    if not stages:
+        raise ConfigError(f"recipe {name} must list its stages: stages = [{', '.join(_NAMES)}]")
+    _require_known(stages, _NAMES, f"recipe {name}")
+    return Recipe(stages=tuple(one for one in _NAMES if one in stages), settings=settings, source=top.get("source", ""))
+
+
+def stage_sections(values: Mapping[str, Any], where: str) -> dict[str, Mapping[str, Any]]:
+    """The sections of a TOML file that are settings of stages.
+
+    Raises:
+        ConfigError: a key is neither the name of a stage nor a key of a recipe, or a stage's name is no section.
+    """
+    _require_known(values, (*_NAMES, *_KEYS), where)
+    sections = {name: section for name, section in values.items() if name in _NAMES}
+    for name, section in sections.items():
+        if not isinstance(section, Mapping):
+            raise ConfigError(f"{where}: {name} is a section of settings, found the value {section!r}")
+    return sections
 
 
 def stage_config(recipe: Recipe, name: str, run: Path) -> Any:
@@ -56,11 +71,12 @@ def stage_config(recipe: Recipe, name: str, run: Path) -> Any:
         for one in fields(stage.config_type)
         if one.metadata.get("role") == "input" and one.name in _NAMES
     }
-    if name == "index":
+    settings = recipe.settings.get(name, {})
+    if name == "index" and "source" not in settings:
         inputs["source"] = _source(recipe, run)
     if name in ("verify", "report"):
         inputs["release"] = str(run / "pack" / "release")
-    return build_config(stage.config_type, merge(inputs, recipe.settings.get(name, {})), name)
+    return build_config(stage.config_type, merge(inputs, settings), name)
 
 
 def recipe_names() -> Sequence[str]:
@@ -87,9 +103,9 @@ def _recipe_path(name: str) -> Path:
     raise ConfigError(f"there is no recipe {name!r}; {hint}")
 
 
-def _unknown_section(unknown: Sequence[str], recipe: str) -> str:
-    if not unknown:
-        return f"recipe {recipe} must list its stages: stages = [{', '.join(_NAMES)}]"
-    nearest = difflib.get_close_matches(unknown[0], [*_NAMES, "source", "stages"], n=1)
-    hint = f"did you mean {nearest[0]}?" if nearest else f"stages: {', '.join(_NAMES)}"
-    return f"recipe {recipe}: {unknown[0]!r} is neither a stage nor a key of a recipe; {hint}"
+def _require_known(found: Iterable[str], known: Sequence[str], where: str) -> None:
+    unknown = next((one for one in found if one not in known), None)
+    if unknown is not None:
+        nearest = difflib.get_close_matches(unknown, known, n=1)
+        hint = f"did you mean {nearest[0]}?" if nearest else f"known: {', '.join(known)}"
+        raise ConfigError(f"{where}: {unknown!r} is not known; {hint}")

@@ -4,7 +4,8 @@ import errno
 import fnmatch
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -13,14 +14,15 @@ from typing import Any
 from tqdm import tqdm
 
 from pipelines.config import config_json, differences, settings_of
+from pipelines.engines.choice import Engine
 from pipelines.engines.local import run_local
 from pipelines.folder import (
     PENDING_FILE,
     QUARANTINE_FILE,
     LedgerEntry,
     StageRecord,
-    append_ledger,
     compact_ledger,
+    ledger_appender,
     locked,
     read_ledger,
     read_stage_record,
@@ -35,8 +37,6 @@ from wsm_data.files.atomic import remove_temporaries
 from wsm_data.files.digest import digest_json
 from wsm_data.files.jsonlines import write_lines
 from wsm_data.schema.verdict import Refusal
-
-Engine = Callable[[Sequence[Any], Callable[[Any], Iterator[Any]], int], Iterator[Any]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,12 +99,14 @@ def run_stage(
     Raises:
         ConfigError: the folder belongs to other settings, or is being written by another process.
         BudgetExceeded: more units were refused than `options.max_refused` allows.
+        WsmError: the disk is full, or two units have one id.
     """
     options = options or RunOptions()
     started = time.monotonic()
+    upstream = upstream_records(config)  # before the listing: what changes while that is read is seen as newer
     units = stage.list_units(config)
     _require_unique(stage, units)
-    record = _record(stage, config, len(units), options.workers)
+    record = _record(stage, config, upstream, len(units), options.workers)
     out = _choose_folder(out, record, options.fork)
     keys = {unit.id: unit_key(record, unit) for unit in units}
     job = _Job(
@@ -121,15 +123,22 @@ def run_stage(
     if options.dry_run:
         job.ledger.update(read_ledger(out))
         return stage_report(stage.name, out, job.settled(), [unit.id for unit in _selected(job)], 0.0)
-    with locked(out):
+    with _full_disk_named(out), locked(out):
         remove_temporaries(out)
         job.ledger.update(read_ledger(out))
         todo = _selected(job)
-        finished = _last_finished(out)
-        write_stage_record(out, replace(record, finished="" if todo else finished))
-        _work(job, todo)
-        _finish(job, finished)
+        if todo or not _is_finished(job):
+            write_stage_record(out, record)  # unfinished from here to the end, for whoever reads it
+            _work(job, todo)
+            _finish(job)
+        else:
+            _keep_record_current(job)
     return stage_report(stage.name, out, job.settled(), [unit.id for unit in todo], time.monotonic() - started)
+
+
+def fingerprint(stage: Stage[Any], config: Any) -> str:
+    """Digest of what decides the bytes of a stage beside its inputs: name, version and settings."""
+    return digest_json({"name": stage.name, "version": stage.version, "settings": settings_of(config)})
 
 
 def unit_key(record: StageRecord, unit: Unit) -> str:
@@ -143,16 +152,17 @@ def _require_unique(stage: Stage[Any], units: Sequence[Unit]) -> None:
         raise WsmError(f"{stage.name}: unit ids must be unique, found twice: {', '.join(sorted(twice)[:5])}")
 
 
-def _record(stage: Stage[Any], config: Any, units: int, workers: int) -> StageRecord:
-    settings = settings_of(config)
+def _record(
+    stage: Stage[Any], config: Any, upstream: Mapping[str, StageRecord], units: int, workers: int
+) -> StageRecord:
     return StageRecord(
         name=stage.name,
         version=stage.version,
-        settings=settings,
+        settings=settings_of(config),
         config=config_json(config),
-        fingerprint=digest_json({"name": stage.name, "version": stage.version, "settings": settings}),
-        inputs={name: upstream.fingerprint for name, upstream in upstream_records(config).items()},
-        seen={name: upstream.finished for name, upstream in upstream_records(config).items()},
+        fingerprint=fingerprint(stage, config),
+        inputs={name: record.fingerprint for name, record in upstream.items()},
+        seen={name: record.finished for name, record in upstream.items()},
         units=units,
         workers=workers,
     )
@@ -166,7 +176,10 @@ def _choose_folder(out: Path, record: StageRecord, fork: bool) -> Path:
         return out.with_name(f"{out.name}-{record.fingerprint[:8]}")
     if old.name != record.name:
         raise ConfigError(f"{out} holds the output of `wsm {old.name}`, not of `wsm {record.name}`; use another --out")
-    changes = differences(old.settings, record.settings) or [f"version: {old.version} -> {record.version}"]
+    changes = differences(
+        {"version of the stage": old.version, **old.settings},
+        {"version of the stage": record.version, **record.settings},
+    )
     raise ConfigError(
         f"{out} was written with other settings of `wsm {record.name}`:\n  "
         + "\n  ".join(changes)
@@ -198,13 +211,16 @@ def _work(job: _Job, todo: Sequence[Unit]) -> None:
     again = {unit.id for unit in todo}
     settled = job.settled().outcomes
     refusals = sum(outcome.state == REFUSED for unit, outcome in settled.items() if unit not in again)
+    _keep_to_budget(job, refusals)
     work = partial(_process_batch, job.stage, job.config, StageContext(out=job.out))
     hidden = job.options.quiet or not todo
-    with tqdm(total=len(todo), desc=job.stage.name, unit="unit", disable=hidden, dynamic_ncols=True) as bar:
-        for outcome in job.engine(_batches(todo), work, job.options.workers):
-            entry = LedgerEntry(key=job.keys[outcome.unit], outcome=outcome)
-            append_ledger(job.out, entry)
-            job.ledger[outcome.unit] = entry
+    with (
+        tqdm(total=len(todo), desc=job.stage.name, unit="unit", disable=hidden, dynamic_ncols=True) as bar,
+        ledger_appender(job.out) as append,
+        closing(job.engine(_batches(todo), work, job.options.workers)) as outcomes,  # no worker outlives the lock
+    ):
+        for outcome in outcomes:
+            job.ledger[outcome.unit] = append(LedgerEntry(key=job.keys[outcome.unit], outcome=outcome))
             refusals += outcome.state == REFUSED
             bar.update()
             _keep_to_budget(job, refusals)
@@ -235,36 +251,49 @@ def _process_batch(stage: Stage[Any], config: Any, context: StageContext, batch:
     left = {unit.id: unit for unit in batch}
     started = time.perf_counter()
     try:
-        for outcome in stage.process(batch, config, context):
-            del left[outcome.unit]
-            yield replace(outcome, seconds=time.perf_counter() - started)
-            started = time.perf_counter()
+        with _full_disk_named(context.out):
+            for outcome in stage.process(batch, config, context):
+                if left.pop(outcome.unit, None) is None:
+                    raise RuntimeError(f"{stage.name} gave an outcome too many, for {outcome.unit}")
+                yield replace(outcome, seconds=time.perf_counter() - started)
+                started = time.perf_counter()
     except DataError as error:
         for unit in left.values():
             yield replace(refused(unit, error), seconds=time.perf_counter() - started)
         return
-    except OSError as error:
-        if error.errno in (errno.ENOSPC, errno.EDQUOT):
-            raise disk_full(context.out) from error
-        raise
     if left:
         raise RuntimeError(f"{stage.name} gave no outcome for {', '.join(left)}")
 
 
-def disk_full(folder: Path) -> WsmError:
-    """The error of a write that found no room."""
-    return WsmError(f"the disk of {folder} is full; free space and run the same command again: what is done is kept")
+@contextmanager
+def _full_disk_named(folder: Path) -> Iterator[None]:
+    """Turn a write that found no room, wherever it was, into an error for a person."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+            raise
+        raise WsmError(
+            f"the disk of {folder} is full ({error}); free space and run the same command again: what is done is kept"
+        ) from error
 
 
-def _last_finished(out: Path) -> str:
-    old = read_stage_record(out)
-    return old.finished if old else ""
+def _is_finished(job: _Job) -> bool:
+    """Whether `finish` came to its end for these very outcomes and upstream states."""
+    old = read_stage_record(job.out)
+    return old is not None and old.finished == _state(job)
 
 
-def _finish(job: _Job, finished: str) -> None:
-    """Write what belongs to no single unit, unless it was written for these very outcomes and upstream states."""
+def _keep_record_current(job: _Job) -> None:
+    """Inputs may lie elsewhere than when the stage was finished: later stages find them through the record."""
+    old = read_stage_record(job.out)
+    if old is not None and old != (new := replace(job.record, finished=old.finished, workers=old.workers)):
+        write_stage_record(job.out, new)
+
+
+def _state(job: _Job) -> str:
     settled = job.settled()
-    state = digest_json(
+    return digest_json(
         [
             *(
                 [unit, one.state, one.digest, [str(two.reason) for two in one.refusals]]
@@ -274,12 +303,16 @@ def _finish(job: _Job, finished: str) -> None:
             dict(job.record.seen),
         ]
     )
-    if state != finished:
-        extra = job.stage.finish(job.config, StageContext(out=job.out), settled) if job.stage.finish else ()
-        _write_refusals(job, extra)
-        compact_ledger(job.out, {unit: job.ledger[unit] for unit in settled.outcomes})
-        write_lines(job.out / PENDING_FILE, [{"unit": unit} for unit in settled.pending])
-    write_stage_record(job.out, replace(job.record, finished=state))
+
+
+def _finish(job: _Job) -> None:
+    """Write what belongs to no single unit, the record last."""
+    settled = job.settled()
+    extra = job.stage.finish(job.config, StageContext(out=job.out), settled) if job.stage.finish else ()
+    _write_refusals(job, extra)
+    compact_ledger(job.out, {unit: job.ledger[unit] for unit in settled.outcomes})
+    write_lines(job.out / PENDING_FILE, [{"unit": unit} for unit in settled.pending])
+    write_stage_record(job.out, replace(job.record, finished=_state(job)))
 
 
 def _write_refusals(job: _Job, extra: Sequence[Refusal]) -> None:

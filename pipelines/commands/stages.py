@@ -11,10 +11,12 @@ from typing import Any
 import typer
 
 from pipelines.config import build_config, config_json, load_toml, merge, parse_assignments
-from pipelines.recipe import Recipe, load_recipe, stage_config
+from pipelines.engines.choice import engine
+from pipelines.folder import read_stage_record
+from pipelines.recipe import Recipe, load_recipe, stage_config, stage_sections
 from pipelines.registry import load_stage, load_stage_module
 from pipelines.report import StageReport, summary_table
-from pipelines.runner import RunOptions, run_stage
+from pipelines.runner import RunOptions, fingerprint, run_stage
 from wsm_data.errors import ConfigError
 from wsm_data.files.digest import digest_json
 
@@ -42,10 +44,10 @@ def run_one(
         typer.echo(f"{release} is whole: {clips} clips, every byte and every trajectory accounted for")
         return
     stage = load_stage(name)
-    values = load_toml(config).get(name, {}) if config else {}
+    values = stage_sections(load_toml(config), str(config)).get(name, {}) if config else {}
     given = {"release": release} if release else {}
     built = build_config(stage.config_type, merge(merge(values, given), parse_assignments(assignments or ())), "")
-    report = _run(name, built, out or Path(name), _options(options))
+    report = _run(name, built, out or Path(name), options.pop("engine"), _options(options))
     typer.echo(summary_table([report]))
 
 
@@ -56,6 +58,7 @@ def run_recipe(recipe: str, out: Path, config: Path | None, assignments: Sequenc
         options["limit"] or options["only"]
     ):  # the selection narrows the first stage; the release says that it is partial
         loaded = replace(loaded, settings=merge({"pack": {"partial": True}}, loaded.settings))
+    engine_name = options.pop("engine")
     run_options = _options(options)
     out = _fork(loaded, out) if run_options.fork else out
     run_options = replace(run_options, fork=False)
@@ -66,17 +69,17 @@ def run_recipe(recipe: str, out: Path, config: Path | None, assignments: Sequenc
             continue
         built = stage_config(loaded, name, out)
         chosen = run_options if position == 0 else replace(run_options, limit=0, only=())
-        reports.append(_run(name, built, out / name, chosen))
+        reports.append(_run(name, built, out / name, engine_name, chosen))
     typer.echo(summary_table(reports))
     for label, path in (("release", out / "pack" / "release"), ("report", out / "report" / "report.html")):
         if path.exists():
             typer.echo(f"{label}: {path}")
 
 
-def _run(name: str, config: Any, out: Path, options: RunOptions) -> StageReport:
+def _run(name: str, config: Any, out: Path, engine_name: str, options: RunOptions) -> StageReport:
     if options.dry_run:
         typer.echo(f"{name}: settings\n{json.dumps(config_json(config), indent=2)}")
-    report = run_stage(load_stage(name), config, out, options)
+    report = run_stage(load_stage(name), config, out, options, engine(engine_name))
     if options.dry_run:
         for unit in report.ran:
             typer.echo(f"{name}: would do {unit}")
@@ -91,8 +94,12 @@ def _options(values: dict[str, Any]) -> RunOptions:
 
 
 def _fork(recipe: Recipe, out: Path) -> Path:
-    digest = digest_json({"stages": recipe.stages, "settings": recipe.settings, "source": recipe.source})
-    return out.with_name(f"{out.name}-{digest[:8]}") if out.exists() else out
+    """The run folder, or one beside it where a stage's folder was written with other settings."""
+    wanted = {name: fingerprint(load_stage(name), stage_config(recipe, name, out)) for name in recipe.stages}
+    records = {name: read_stage_record(out / name) for name in recipe.stages}
+    if all(record is None or record.fingerprint == wanted[name] for name, record in records.items()):
+        return out
+    return out.with_name(f"{out.name}-{digest_json(wanted)[:8]}")
 
 
 def _inputs_exist(recipe: Recipe, name: str, out: Path) -> bool:

@@ -2,51 +2,46 @@
 
 import multiprocessing
 import os
-import queue
 import signal
-import traceback
-from collections.abc import Callable, Iterator, Sequence
+import threading
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
+from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any, TypeVar
 
+from pipelines.engines.task import limit_threads, results_of, unless_failed
 from wsm_data.errors import WsmError
 
 TaskT = TypeVar("TaskT")
 ResultT = TypeVar("ResultT")
 
-_POLL_S = 0.5
-_TASKS_IN_FLIGHT_PER_WORKER = 2
+_DEATH_WAIT_S = 5.0
 
 
 @dataclass(frozen=True)
 class _TaskEnded:
-    """A worker has yielded everything of one task."""
+    """A worker has sent everything of one task."""
 
 
-@dataclass(frozen=True)
-class _TaskFailed:
-    """A worker's task raised; foreseen errors travel whole, bugs as their traceback."""
-
-    error: WsmError | OSError | None
-    trace: str
-
-
-def run_local(tasks: Sequence[TaskT], work: Callable[[TaskT], Iterator[ResultT]], workers: int) -> Iterator[ResultT]:
+def run_local(
+    tasks: Sequence[TaskT], work: Callable[[TaskT], Iterator[ResultT]], workers: int
+) -> Generator[ResultT, None, None]:
     """Apply `work` to every task and yield its results as they come, in no particular order across tasks.
 
     With one worker everything happens in this process. More are started afresh (`spawn`): nothing is inherited from
-    threads or libraries of this one, so results cannot depend on what it did before. Workers end when this process
-    does, even if it is killed.
+    threads or libraries of this one, so results cannot depend on what it did before. Workers end when the generator
+    is closed, and when this process ends, even if it is killed.
 
     Args:
-        tasks: must pickle, as must `work`, when workers > 1.
+        tasks: must pickle, as must `work` and its results, when workers > 1.
         work: generator function of one task.
         workers: number of processes.
 
     Raises:
         WsmError: a task raised one, or a worker died.
-        RuntimeError: a task raised anything else; the message is its traceback.
+        RuntimeError: a task in a worker raised anything else; the message is its traceback.
     """
     if workers <= 1 or len(tasks) <= 1:
         limit_threads()
@@ -56,82 +51,94 @@ def run_local(tasks: Sequence[TaskT], work: Callable[[TaskT], Iterator[ResultT]]
     yield from _run_pool(tasks, work, min(workers, len(tasks)))
 
 
-def limit_threads() -> None:
-    """One thread per process for OpenCV and BLAS: processes are the parallelism, and sums do not depend on cores."""
-    import cv2  # loaded here so that the command line stays light
-    from threadpoolctl import threadpool_limits
+def _run_pool(tasks: Sequence[Any], work: Callable[[Any], Iterator[Any]], workers: int) -> Generator[Any, None, None]:
+    """One connection a worker, and one task at a time on it.
 
-    cv2.setNumThreads(1)
-    threadpool_limits(limits=1)
-
-
-def _run_pool(tasks: Sequence[Any], work: Callable[[Any], Iterator[Any]], workers: int) -> Iterator[Any]:
-    context = multiprocessing.get_context("spawn")
-    to_do: Any = context.Queue()
-    results: Any = context.Queue()
-    processes = [context.Process(target=_worker, args=(work, to_do, results), daemon=True) for _ in range(workers)]
+    A queue that all share would hang where a worker dies while it holds the queue's lock, and would lose what does
+    not pickle. A connection ends with its worker, and says so.
+    """
+    pool: dict[Connection, BaseProcess] = {}
     waiting = iter(tasks)
-    open_tasks = 0
-    for process in processes:
-        process.start()
     try:
-        for _ in range(workers * _TASKS_IN_FLIGHT_PER_WORKER):
-            open_tasks += _put_next(waiting, to_do)
-        while open_tasks:
-            result = _next_result(results, processes)
-            if isinstance(result, _TaskEnded):
-                open_tasks += _put_next(waiting, to_do) - 1
-            elif isinstance(result, _TaskFailed):
-                raise result.error or RuntimeError(f"a worker failed:\n{result.trace}")
-            else:
-                yield result
+        with _interrupts_held_back():
+            for _ in range(workers):
+                connection, process = _start(work)
+                pool[connection] = process
+        busy = [connection for connection in pool if _give_next(waiting, connection, pool[connection])]
+        while busy:
+            ready = wait(busy)
+            for connection in [one for one in busy if one in ready]:
+                result = _receive(connection, pool[connection])
+                if not isinstance(result, _TaskEnded):
+                    yield unless_failed(result)
+                elif not _give_next(waiting, connection, pool[connection]):
+                    busy.remove(connection)
     finally:
-        for process in processes:
+        for process in pool.values():
             process.terminate()
-        for process in processes:
+        for connection, process in pool.items():
             process.join()
+            connection.close()
 
 
-def _put_next(waiting: Iterator[Any], to_do: Any) -> int:
+@contextmanager
+def _interrupts_held_back() -> Iterator[None]:
+    """Ctrl-C is this process's to handle: workers inherit that it is blocked, here it is delivered at the end."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _start(work: Callable[[Any], Iterator[Any]]) -> tuple[Connection, BaseProcess]:
+    context = multiprocessing.get_context("spawn")
+    ours, theirs = context.Pipe()
+    process = context.Process(target=_worker, args=(work, theirs), daemon=True)
+    process.start()
+    theirs.close()  # the worker's copy is the last one: when the worker ends, ours reads the end of the stream
+    return ours, process
+
+
+def _give_next(waiting: Iterator[Any], connection: Connection, process: BaseProcess) -> bool:
     for task in waiting:
-        to_do.put(task)
-        return 1
-    return 0
-
-
-def _next_result(results: Any, processes: Sequence[BaseProcess]) -> Any:
-    while True:
         try:
-            return results.get(timeout=_POLL_S)
-        except queue.Empty:
-            for process in processes:
-                if process.exitcode is not None:
-                    raise WsmError(
-                        f"a worker process died (exit code {process.exitcode}; -9 usually means that memory ran out); "
-                        "what was finished is kept: run the same command again, with fewer --workers if it recurs"
-                    ) from None
+            connection.send(task)
+        except OSError as error:
+            raise _death(process) from error
+        return True
+    return False
 
 
-def _worker(work: Callable[[Any], Iterator[Any]], to_do: Any, results: Any) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to handle
+def _receive(connection: Connection, process: BaseProcess) -> Any:
+    try:
+        return connection.recv()
+    except (EOFError, OSError) as error:
+        raise _death(process) from error
+
+
+def _death(process: BaseProcess) -> WsmError:
+    process.join(_DEATH_WAIT_S)
+    return WsmError(
+        f"a worker process died (exit code {process.exitcode}; -9 usually means that memory ran out, 1 that it could "
+        "not start or send a result: its own message stands above); what was finished is kept: run the same command "
+        "again, with fewer --workers if it recurs"
+    )
+
+
+def _worker(work: Callable[[Any], Iterator[Any]], connection: Connection) -> None:
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     limit_threads()
     while True:
-        try:
-            task = to_do.get(timeout=_POLL_S)
-        except queue.Empty:
-            if not _parent_alive():
-                return
-            continue
-        try:
-            for result in work(task):
-                results.put(result)
-        except (WsmError, OSError) as error:
-            results.put(_TaskFailed(error, ""))
-        except Exception:  # noqa: BLE001 - a bug must reach the parent with its traceback instead of a silent death
-            results.put(_TaskFailed(None, traceback.format_exc()))
-        results.put(_TaskEnded())
+        task = connection.recv()
+        for result in results_of(work, task):
+            connection.send(result)
+        connection.send(_TaskEnded())
 
 
-def _parent_alive() -> bool:
+def _end_with_parent() -> None:
+    """End this process when the parent does: a resumed run must not meet writers of the run before it."""
     parent = multiprocessing.parent_process()
-    return parent is not None and parent.is_alive() and os.getppid() != 1
+    if parent is not None:
+        wait([parent.sentinel])
+        os._exit(1)
