@@ -31,7 +31,7 @@ def histogram(shown: Distribution) -> Figure:
     axes.axvline(median, color=BAR_SECOND, lw=2)
     written = f"{median:.1%}" if shown.share else f"{median:.4g}"
     axes.set_title(f"median {written}", loc="right", fontsize=10, fontweight="normal", color=MUTED)
-    axes.set(xlabel=shown.label, ylabel="clips (count)", xlim=_widened(edges))
+    axes.set(xlabel=shown.label, ylabel="clips (count)", xlim=_limits(edges, shown.share))
     axes.xaxis.set_major_locator(MaxNLocator(nbins=5))
     axes.xaxis.set_major_formatter(PercentFormatter(1.0) if shown.share else ScalarFormatter(useOffset=False))
     axes.yaxis.set_major_locator(MaxNLocator(nbins=4, integer=True))
@@ -49,10 +49,14 @@ def bin_edges(numbers: Float64Array, finest: float) -> Float64Array:
     return np.arange(first, last + 1) * width - 5e-7 * width
 
 
-def _widened(edges: Float64Array) -> tuple[float, float]:
-    """Limits that show at least twelve bins, so that few bins do not look like a spread."""
-    missing = max(0.0, 12 - (len(edges) - 1)) / 2 * (edges[1] - edges[0])
-    return float(edges[0] - missing), float(edges[-1] + missing)
+def _limits(edges: Float64Array, share: bool) -> tuple[float, float]:
+    """Limits that show at least twelve bins, so that few bins do not look like a spread, and no impossible numbers."""
+    width = edges[1] - edges[0]
+    missing = max(0.0, 12 - (len(edges) - 1)) / 2 * width
+    low, high = float(edges[0] - missing), float(edges[-1] + missing)
+    if edges[0] > -width:
+        low = max(low, min(0.0, float(edges[0])))
+    return (low, min(high, 1.0 + width)) if share else (low, high)
 
 
 def depth_error_chart(errors: DepthErrors) -> Figure:
@@ -61,7 +65,7 @@ def depth_error_chart(errors: DepthErrors) -> Figure:
     edges = np.array(errors.edges_m)
     means = np.array([np.nan if mean is None else mean for mean in errors.mean_error_m])
     axes.bar(edges[:-1], means, width=np.diff(edges) * 0.96, align="edge", color=BAR, lw=0)
-    axes.set(xlabel="true depth (m)", ylabel="mean absolute error (m)", xlim=(0, edges[-1]))
+    axes.set(xlabel="true depth (m)", ylabel="mean error (m)", xlim=(0, edges[-1]))
     axes.grid(axis="y")
     return figure
 
@@ -74,7 +78,7 @@ def stage_chart(stages: Sequence[StageSummary]) -> Figure:
     seconds = [stage.seconds for stage in stages]
     axes.barh(range(len(stages)), seconds, height=0.66, color=BAR, lw=0)
     for row, stage in enumerate(stages):
-        rate = f", {stage.done / stage.seconds:.3g} units per s" if stage.seconds else ""
+        rate = "" if stage.done_per_s is None else f", {stage.done_per_s:.3g} units per s"
         text = f"{stage.seconds:.1f} s" + rate
         axes.annotate(text, (stage.seconds, row), xytext=(6, 0), textcoords="offset points", va="center", fontsize=10)
     axes.set_yticks(range(len(stages)), [stage.name for stage in stages])

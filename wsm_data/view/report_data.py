@@ -31,6 +31,11 @@ class StageSummary:
     workers: int
     fingerprint: str = ""
 
+    @property
+    def done_per_s(self) -> float | None:
+        """Units done for each second spent on units, refused ones included; None where no time was measured."""
+        return self.done / self.seconds if self.seconds else None
+
 
 @dataclass(frozen=True, kw_only=True)
 class ReportData:
