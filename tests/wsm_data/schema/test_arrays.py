@@ -48,3 +48,12 @@ def test_a_frozen_array_shares_its_memory_and_cannot_be_written_to():
     with pytest.raises(ValueError, match="read-only"):
         frozen[0] = 1
     array[0] = 5.0  # the caller's own array stays writable
+
+
+def test_exactly_the_float16_patterns_that_numpy_calls_finite_are_accepted():
+    patterns = np.arange(1 << 16, dtype=np.uint16).view(np.float16)
+    finite = np.isfinite(patterns)
+    require_finite("latent", patterns[finite].reshape(2, -1)[:, ::3])
+    for pattern in patterns[~finite][::17]:
+        with pytest.raises(ValueError, match=r"at index \[1\]$"):
+            require_finite("latent", np.array([0, pattern], np.float16))
