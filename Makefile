@@ -8,7 +8,7 @@ BIN := $(VENV)/bin
 INSTALL := $(BIN)/python -m pip -qq --disable-pip-version-check install --no-compile
 DEMO_OUT ?= runs/demo
 
-.PHONY: demo test check bench clean
+.PHONY: demo test check bench
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.ready
@@ -25,9 +25,6 @@ check: $(VENV)/.ready-dev
 
 bench: $(VENV)/.ready-bench
 	@set -e; for program in $$(grep -l __main__ bench/*.py); do echo "$$program"; $(BIN)/python "$$program"; done
-
-clean:
-	rm -rf $(VENV) runs
 
 # Each stamp is newer than the files that decided what was installed. Torch, by far the largest package, has a stamp of
 # its own; its version, like every other, stands in constraints.txt alone.
