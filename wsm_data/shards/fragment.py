@@ -29,7 +29,7 @@ class FragmentInfo:
         meta: the clip's own meta data.
         size_bytes: size of the fragment, a multiple of 512.
         digest: xxh3_128 of the fragment, in hexadecimal.
-        members: table of the members, offsets from the start of the fragment.
+        members: table of the members.
         rgb_sums: sums of the colour latents, padding left out.
         depth_sums: sums of the depth latents, padding left out.
     """

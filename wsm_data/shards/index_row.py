@@ -82,7 +82,7 @@ class IndexRow:
         padded_frames: repeated still frames at the end.
         codec_digest: digest of the codec.
         source_digest: content digest of the trajectory.
-        members: places in the shard, dtypes, shapes and checksums.
+        members: places from the first byte of the clip, dtypes, shapes and checksums.
         axes: lengths of the axes F, C, h, w, T, Y, X.
     """
 
@@ -119,11 +119,6 @@ class IndexRow:
         """Unit id of the trajectory, `group/scene/episode`."""
         return f"{self.group}/{self.scene}/{self.episode}"
 
-    @property
-    def members_in_clip(self) -> tuple[Member, ...]:
-        """The members with offsets from the first byte of the clip."""
-        return tuple(member.moved(-self.clip_offset) for member in self.members)
-
 
 def index_row(info: FragmentInfo, *, split: str, shard: str, position: int, clip_offset: int) -> IndexRow:
     """The row of a clip whose fragment stands at `clip_offset` of a shard."""
@@ -148,7 +143,7 @@ def index_row(info: FragmentInfo, *, split: str, shard: str, position: int, clip
         padded_frames=meta.padded_frames,
         codec_digest=meta.codec_digest,
         source_digest=meta.source_digest,
-        members=tuple(member.moved(clip_offset) for member in info.members),
+        members=info.members,
         axes=axes,
     )
 
@@ -159,7 +154,7 @@ def row_record(row: IndexRow) -> dict[str, Any]:
     record |= {column: row.axes[axis] for axis, column in AXIS_COLUMNS.items()}
     record |= {"clip_offset": row.clip_offset, "clip_size": row.clip_size}
     for member in row.members:
-        record[f"{member.name}_offset"] = member.array_offset
+        record[f"{member.name}_offset"] = row.clip_offset + member.array_offset
         record[f"{member.name}_size"] = member.array_size
         record[f"{member.name}_checksum"] = int(member.checksum, 16)
     return record
@@ -175,8 +170,7 @@ def parse_row(record: Mapping[str, Any]) -> IndexRow:
         row = _row(record)
     except (ValueError, TypeError) as error:  # a length below zero, an empty cell
         raise _contradiction(record) from error
-    end = row.members[-1].end_offset
-    if row_record(row) != record or end != row.clip_offset + row.clip_size:
+    if row_record(row) != record or row.members[-1].end_offset != row.clip_size:
         raise _contradiction(record)
     return row
 
@@ -188,7 +182,6 @@ def _row(record: Mapping[str, Any]) -> IndexRow:
         axes=axes,
         meta_size=record[f"{META}_size"],
         checksums={name: f"{record[f'{name}_checksum']:016x}" for name in MEMBER_NAMES},
-        start=record["clip_offset"],
     )
     return IndexRow(
         **{name: record[name] for name in (*UNIQUE_COLUMNS, *REPEATED_COLUMNS, "position", "padded_frames")},

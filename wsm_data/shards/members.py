@@ -1,7 +1,7 @@
 """Where the members of a clip stand in a tar: computed from the key and the axes, never searched for."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
@@ -21,7 +21,7 @@ STORED_DTYPES: Mapping[str, np.dtype[np.generic]] = MappingProxyType(
 
 @dataclass(frozen=True, kw_only=True)
 class Member:
-    """One file of a clip. Offsets count from the start of the fragment, or of the shard once it is packed.
+    """One file of a clip. Offsets count from the first byte of the clip.
 
     Attributes:
         name: `rgb_latent`, ..., `meta`.
@@ -56,15 +56,6 @@ class Member:
         """First byte after the member and its padding."""
         return self.data_offset + padded(self.data_size)
 
-    def moved(self, distance: int) -> "Member":
-        """The same member where the clip starts `distance` bytes later."""
-        return replace(
-            self,
-            header_offset=self.header_offset + distance,
-            data_offset=self.data_offset + distance,
-            array_offset=self.array_offset + distance,
-        )
-
 
 def shape_of(name: str, axes: Mapping[str, int]) -> tuple[int, ...]:
     """Shape of an array member, from the lengths of the axes F, C, h, w, T, Y, X."""
@@ -79,12 +70,10 @@ def axes_of(arrays: Mapping[str, np.ndarray]) -> dict[str, int]:
     return lengths
 
 
-def lay_out(
-    key: str, *, axes: Mapping[str, int], meta_size: int, checksums: Mapping[str, str], start: int = 0
-) -> tuple[Member, ...]:
-    """Members of a clip whose first header stands at `start`: equal arguments, equal places, in every release."""
+def lay_out(key: str, *, axes: Mapping[str, int], meta_size: int, checksums: Mapping[str, str]) -> tuple[Member, ...]:
+    """Members of a clip: equal arguments, equal places, in every release."""
     members: list[Member] = []
-    offset = start
+    offset = 0
     for name in MEMBER_NAMES:
         member = _place(key, name, axes=axes, meta_size=meta_size, checksum=checksums[name], offset=offset)
         members.append(member)

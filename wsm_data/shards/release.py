@@ -47,8 +47,8 @@ class Release:
         where = f"{row.shard}, clip {key}"
         data = memoryview(self._read(row, where))
         if verify:
-            check_members(data, row.members_in_clip, where)
-        clip = decode_clip(data, row.members_in_clip, where)
+            check_members(data, row.members, where)
+        clip = decode_clip(data, row.members, where)
         if (clip.meta.key, clip.meta.codec_digest) != (key, self.manifest.codec.digest):
             raise IntegrityError(
                 f"{where}: the meta data must be of this clip and codec digest {self.manifest.codec.digest}, found "

@@ -28,11 +28,11 @@ def check_clip(data: memoryview, row: IndexRow, manifest: ReleaseManifest) -> li
     """
     if len(data) < row.clip_size:
         return [_cut(data, row)]
-    damage = [finding for member in row.members_in_clip for finding in _damage(data, member, row)]
+    damage = [finding for member in row.members for finding in _damage(data, member, row)]
     if damage:
         return damage  # values of damaged bytes say nothing more
     try:
-        clip = decode_clip(data, row.members_in_clip, f"{row.shard}, clip {row.key}")
+        clip = decode_clip(data, row.members, f"{row.shard}, clip {row.key}")
     except IntegrityError as error:
         return [_finding(FindingKind.CLIP_INVALID, row, str(error))]
     return [
@@ -47,7 +47,7 @@ def _cut(data: memoryview, row: IndexRow) -> Finding:
     if not len(data):
         message = f"the shard ends before the clip, which must start at byte {row.clip_offset}; fetch the shard again"
         return _finding(FindingKind.CLIP_LOST, row, message)
-    member = next(member for member in row.members_in_clip if len(data) < member.end_offset)
+    member = next(member for member in row.members if len(data) < member.end_offset)
     if len(data) == member.header_offset:
         place = f"before {member.file_name}, between two members"
     elif len(data) < member.array_offset:

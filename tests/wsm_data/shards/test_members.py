@@ -20,19 +20,13 @@ def test_members_stand_in_the_order_of_the_format_one_after_the_other() -> None:
 
 @pytest.mark.parametrize("key", ["a/b/c", "/".join(["a" * 100, "b" * 100, "c" * 53])], ids=["short", "long"])
 def test_every_array_starts_at_a_multiple_of_64_bytes(key: str) -> None:
-    members = lay_out(key, axes=AXES, meta_size=700, checksums=CHECKSUMS, start=512 * 7)
+    members = lay_out(key, axes=AXES, meta_size=700, checksums=CHECKSUMS)
     assert [member.array_offset % 64 for member in members] == [0] * len(members)
 
 
 def test_the_header_bytes_lead_from_the_header_to_the_array() -> None:
-    for member in lay_out("a/b/c", axes=AXES, meta_size=700, checksums=CHECKSUMS, start=1024):
+    for member in lay_out("a/b/c", axes=AXES, meta_size=700, checksums=CHECKSUMS):
         assert len(header_bytes("a/b/c", member)) == member.array_offset - member.header_offset
-
-
-def test_a_clip_that_starts_later_is_the_same_moved() -> None:
-    here = lay_out("a/b/c", axes=AXES, meta_size=700, checksums=CHECKSUMS)
-    there = lay_out("a/b/c", axes=AXES, meta_size=700, checksums=CHECKSUMS, start=4096)
-    assert tuple(member.moved(4096) for member in here) == there
 
 
 def test_sizes_are_those_of_the_arrays(make_clip: Callable[..., Clip]) -> None:

@@ -111,7 +111,7 @@ def test_a_damaged_member_is_named_with_shard_and_clip(tiny: SimpleNamespace, na
     member = next(member for member in row.members if member.name == name)
     path = tiny.folder / row.shard
     data = bytearray(path.read_bytes())
-    data[member.array_offset + member.array_size // 2] ^= 0x10
+    data[row.clip_offset + member.array_offset + member.array_size // 2] ^= 0x10
     path.write_bytes(data)
     with pytest.raises(IntegrityError, match=rf"{row.shard}, clip {row.key}: the checksum of {member.file_name}"):
         release.read_clip(row.key)
@@ -162,7 +162,8 @@ def test_unchecked_bytes_are_still_a_valid_clip_or_refused(tiny: SimpleNamespace
     path = tiny.folder / row.shard
     data = bytearray(path.read_bytes())
     poses = next(member for member in row.members if member.name == "poses")
-    data[poses.array_offset : poses.array_offset + 4] = np.float32(np.nan).tobytes()
+    place = row.clip_offset + poses.array_offset
+    data[place : place + 4] = np.float32(np.nan).tobytes()
     path.write_bytes(data)
     with pytest.raises(IntegrityError, match="poses must be finite"):
         release.read_clip(row.key, verify=False)

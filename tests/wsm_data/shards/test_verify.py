@@ -79,7 +79,7 @@ def test_damage_in_a_shard_is_named_with_shard_and_clip(tiny: SimpleNamespace) -
     row = open_release(tiny.folder).index.row(tiny.clips[5].meta.key)
     path = tiny.folder / row.shard
     damaged = bytearray(path.read_bytes())
-    damaged[row.members[0].array_offset + 11] ^= 1
+    damaged[row.clip_offset + row.members[0].array_offset + 11] ^= 1
     path.write_bytes(damaged)
     assert _kinds(tiny.folder) == [("clip.payload", row.shard, row.key), ("shard.changed", row.shard, None)]
 

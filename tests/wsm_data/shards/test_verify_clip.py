@@ -53,7 +53,7 @@ def test_a_sound_clip_has_no_findings(stored: Stored) -> None:
 
 
 def test_every_changed_header_or_padding_byte_is_found_where_it_is(stored: Stored) -> None:
-    for member in stored.row.members_in_clip:
+    for member in stored.row.members:
         for kind, start, end in (
             (FindingKind.CLIP_HEADER, member.header_offset, member.array_offset),
             (FindingKind.CLIP_PADDING, member.data_offset + member.data_size, member.end_offset),
@@ -67,7 +67,7 @@ def test_every_changed_header_or_padding_byte_is_found_where_it_is(stored: Store
 
 
 def test_tar_and_npy_headers_are_told_apart(stored: Stored) -> None:
-    member = stored.row.members_in_clip[0]
+    member = stored.row.members[0]
     for place, name in ((member.header_offset + 3, "tar"), (member.data_offset + 20, "npy")):
         damaged = bytearray(stored.data)
         damaged[place] ^= 0xFF
@@ -75,7 +75,7 @@ def test_tar_and_npy_headers_are_told_apart(stored: Stored) -> None:
 
 
 def test_every_changed_payload_byte_is_found_in_its_member(stored: Stored) -> None:
-    for member in stored.row.members_in_clip:
+    for member in stored.row.members:
         for place in range(member.array_offset, member.array_offset + member.array_size, 97):
             damaged = bytearray(stored.data)
             damaged[place] ^= 0x80
@@ -85,7 +85,7 @@ def test_every_changed_payload_byte_is_found_in_its_member(stored: Stored) -> No
 
 def test_a_cut_at_any_length_is_described_by_where_it_falls(stored: Stored) -> None:
     assert "the shard ends before the clip" in _only(stored.check(b""), FindingKind.CLIP_LOST)
-    for member in stored.row.members_in_clip:
+    for member in stored.row.members:
         cuts = {
             f"before {member.file_name}": member.header_offset,
             f"inside the header of {member.file_name}": member.header_offset + 100,
@@ -99,7 +99,7 @@ def test_a_cut_at_any_length_is_described_by_where_it_falls(stored: Stored) -> N
 
 def test_members_that_form_no_valid_clip_are_found_though_their_checksums_fit(stored: Stored) -> None:
     damaged = bytearray(stored.data)
-    poses = next(member for member in stored.row.members_in_clip if member.name == "poses")
+    poses = next(member for member in stored.row.members if member.name == "poses")
     damaged[poses.array_offset + 12 : poses.array_offset + 16] = np.float32(0.5).tobytes()
     content = bytes(damaged[poses.array_offset : poses.array_offset + poses.array_size])
     members = tuple(

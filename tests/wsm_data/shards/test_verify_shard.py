@@ -67,7 +67,7 @@ def test_a_cut_at_a_sample_boundary_names_the_clips_that_are_lost(shard: SimpleN
 
 def test_a_cut_at_a_member_boundary_names_the_clip_and_the_member(shard: SimpleNamespace) -> None:
     row = shard.rows[1]
-    _cut(shard.path, row.members[3].header_offset)
+    _cut(shard.path, row.clip_offset + row.members[3].header_offset)
     findings = shard.check()
     assert _kinds(findings)[:2] == [("clip.cut", row.key), ("clip.lost", shard.rows[2].key)]
     assert "ends before poses.npy, between two members" in findings[0].message
@@ -75,7 +75,7 @@ def test_a_cut_at_a_member_boundary_names_the_clip_and_the_member(shard: SimpleN
 
 def test_a_cut_inside_a_header_names_the_clip_and_the_member(shard: SimpleNamespace) -> None:
     row = shard.rows[-1]
-    _cut(shard.path, row.members[5].header_offset + 257)
+    _cut(shard.path, row.clip_offset + row.members[5].header_offset + 257)
     findings = shard.check()
     assert _kinds(findings) == [("clip.cut", row.key), ("shard.size", None), ("shard.changed", None)]
     assert "ends inside the header of geodesic_mm.npy" in findings[0].message
@@ -106,7 +106,7 @@ def test_any_changed_byte_is_found_in_its_clip(shard: SimpleNamespace) -> None:
 def test_damage_in_two_clips_is_found_in_both(shard: SimpleNamespace) -> None:
     damaged = bytearray(shard.path.read_bytes())
     for row in (shard.rows[0], shard.rows[2]):
-        damaged[row.members[1].array_offset] ^= 1
+        damaged[row.clip_offset + row.members[1].array_offset] ^= 1
     shard.path.write_bytes(damaged)
     findings = [finding for finding in shard.check() if finding.kind == FindingKind.CLIP_PAYLOAD]
     assert [finding.clip for finding in findings] == [shard.rows[0].key, shard.rows[2].key]
