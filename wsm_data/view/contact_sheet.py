@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 from matplotlib.ticker import MaxNLocator
 
 from wsm_data.codecs.base import VideoCodec
@@ -18,6 +20,7 @@ from wsm_data.view.clip_pictures import ClipPictures, decode_pictures, spread_fr
 from wsm_data.view.depth_colours import draw_depth_bar
 from wsm_data.view.map_plot import PATH_COLOUR, draw_clip_map, draw_frame_marks, map_key
 from wsm_data.view.style import BAR, GRID, MUTED, figure_png, figure_style, new_figure
+from wsm_data.view.text_table import printable
 
 _WIDTH_PX = 1600
 _MARGIN_PX = 40
@@ -31,7 +34,6 @@ _HEADER_PX = 96
 _LOWER_PX = 640
 _MAP_PX = (670, 490)
 _PLOT_LEFT_PX = 870
-_TITLE_CHARACTERS = 104
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,13 +90,12 @@ def _axes(figure: Figure, left_px: float, top_px: float, width_px: float, height
     )
 
 
-def _text(figure: Figure, left_px: float, top_px: float, text: str, **style: Any) -> None:
-    figure.text(left_px / _WIDTH_PX, 1 - top_px / (figure.get_figheight() * 100), text, va="top", **style)
+def _text(figure: Figure, left_px: float, top_px: float, text: str, **style: Any) -> Text:
+    return figure.text(left_px / _WIDTH_PX, 1 - top_px / (figure.get_figheight() * 100), text, va="top", **style)
 
 
 def _draw_header(figure: Figure, clip: Clip) -> None:
     meta = clip.meta
-    _text(figure, _MARGIN_PX, 24, elided(meta.key, _TITLE_CHARACTERS), fontsize=17, fontweight="bold")
     facts = (
         meta.dataset,
         f"camera {meta.id.camera}, {meta.camera_height_m:.2f} m high, {np.rad2deg(meta.camera_pitch_rad):.1f}° down",
@@ -103,7 +104,17 @@ def _draw_header(figure: Figure, clip: Clip) -> None:
         f"depth measured {depth_valid_share(clip):.1%}",
         f"map from {meta.map_from}, {meta.map_resolution_m * 100:g} cm cells",
     )
-    _text(figure, _MARGIN_PX, 60, elided("   ·   ".join(facts), 230), fontsize=11, color=MUTED)
+    _fitted_text(figure, 24, meta.key, fontsize=17, fontweight="bold")
+    _fitted_text(figure, 60, printable("   ·   ".join(facts)), fontsize=11, color=MUTED)
+
+
+def _fitted_text(figure: Figure, top_px: float, text: str, **style: Any) -> None:
+    """Write a line from margin to margin; where it is longer, its middle gives way."""
+    artist = _text(figure, _MARGIN_PX, top_px, text, **style)
+    renderer, characters = FigureCanvasAgg(figure).get_renderer(), len(text)
+    while artist.get_window_extent(renderer).width > _WIDTH_PX - 2 * _MARGIN_PX:
+        characters -= 1
+        artist.set_text(elided(text, characters))
 
 
 def elided(text: str, characters: int) -> str:
@@ -156,7 +167,7 @@ def _draw_distance(axes: Axes, clip: Clip, frames: Sequence[int]) -> None:
         list(frames), clip.expert_distance[list(frames)], ls="", marker="o", ms=5, color=PATH_COLOUR, mec="white", mew=1
     )
     axes.set(title="Distance to the goal region (dots: the pictures above)", ylabel="geodesic distance (m)")
-    axes.set_ylim(bottom=0)
+    axes.set_ylim(0, 1.06 * float(clip.expert_distance.max()) or 1.0)
     _finish_time_axes(axes, clip)
 
 

@@ -131,6 +131,7 @@ def draw_frame_marks(axes: Axes, path_xy_m: Float64Array, frames: Sequence[int])
     """
     spots = path_xy_m[list(frames)]
     axes.plot(*spots.T, ls="", marker="o", ms=5, color=PATH_COLOUR, mec="white", mew=1.0, zorder=6)
+    axes.apply_aspect()  # else the scale is not yet that of the drawing
     last_px = np.full(2, -np.inf)
     for number, spot in enumerate(spots, start=1):
         spot_px = axes.transData.transform(spot)

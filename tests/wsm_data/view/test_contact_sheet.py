@@ -61,7 +61,7 @@ def test_no_text_overlaps_another(figure):
     """Bounding boxes of titles, captions and axis labels; within an axes matplotlib places ticks itself."""
     figure.canvas.draw()
     renderer = figure.canvas.get_renderer()
-    texts = [text for text in figure.texts if text.get_text()]
+    texts = list(figure.texts)
     for axes in figure.axes:
         if axes.axison:
             texts += [axes.xaxis.label, axes.yaxis.label, axes._left_title]
@@ -88,6 +88,16 @@ def test_still_frames_are_marked_only_where_there_are_any(figure, made):
     clip = made.clip(padded_frames=0)
     with figure_style():
         assert notes(contact_sheet_figure(clip, decode_pictures(clip, made.codec, (0, 12)))) == []
+
+
+def test_a_long_name_gives_way_in_its_middle(made):
+    scene = "stairwell" * 18
+    clip = made.clip(f"synth_d435i/{scene}/000003")
+    with figure_style():
+        title = contact_sheet_figure(clip, decode_pictures(clip, made.codec, (0,))).texts[0].get_text()
+    assert title.startswith("synth_d435i/stairwell")
+    assert "…" in title
+    assert title.endswith("stairwell/000003")
 
 
 def test_a_clip_of_one_frame_has_a_sheet(made, tmp_path):

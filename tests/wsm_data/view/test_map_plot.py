@@ -115,6 +115,15 @@ def test_marks_are_numbered_and_numbers_never_touch(axes, clip):
     assert numbers == [str(number) for number in range(1, 10)]  # the last two stand where the ninth is
 
 
+def test_numbers_keep_their_distance_on_a_map_that_is_narrower_than_its_axes(axes, made):
+    cells = np.zeros((400, 20), np.uint8)
+    draw_clip_map(axes, made.clip(occupancy=cells, geodesic_mm=np.zeros((400, 20), np.uint16)))
+    before = len(axes.texts)
+    steps = np.stack([np.linspace(0, 0.3, 9), np.full(9, 5.0)], axis=1)  # 20 m are 320 px high: 0.3 m are 5 px
+    draw_frame_marks(axes, steps, range(9))
+    assert [text.get_text() for text in axes.texts[before:]] == ["1"]
+
+
 def test_a_scene_shows_training_and_held_out_paths_apart(axes, made):
     shifted = made.clip(map_origin_cell=(-10, 60))  # the same map, but not the same poses: the paths coincide
     scene = scene_overview("home", [scene_path(made.clip(), "train"), scene_path(shifted, "test")])
