@@ -47,7 +47,8 @@ def depth_m_from_latent_video(video: Float32Array, depth_range: DepthRange) -> F
     """
     require_array("video", video, np.float32, (None, None, None, 3))
     u: Float64Array = (np.clip(video.mean(axis=-1, dtype=np.float64), -1, 1) + 1) / 2
-    return (depth_range.min_m * (depth_range.max_m / depth_range.min_m) ** u).astype(np.float32)
+    depth_m = (depth_range.min_m * (depth_range.max_m / depth_range.min_m) ** u).astype(np.float32)
+    return np.clip(depth_m, np.float32(depth_range.min_m), np.float32(depth_range.max_m))
 
 
 def valid_share(valid: BoolArray, spatial_ratio: int = 16) -> Uint8Array:

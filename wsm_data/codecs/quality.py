@@ -109,8 +109,10 @@ def depth_error_by_range(
     _require_same_shape("valid", valid, reference_m)
     true_m = reference_m[valid].astype(np.float64)
     error_m = np.abs(decoded_m[valid] - true_m)
-    counts, _ = np.histogram(true_m, bins=edges_m)
-    sums, _ = np.histogram(true_m, bins=edges_m, weights=error_m)
+    # In the dtype of the reference, so that depth clipped to the outer border lies on it and not a rounding outside.
+    bins = np.asarray(edges_m, reference_m.dtype).astype(np.float64)
+    counts, _ = np.histogram(true_m, bins=bins)
+    sums, _ = np.histogram(true_m, bins=bins, weights=error_m)
     return DepthErrors(
         edges_m=tuple(float(edge) for edge in edges_m),
         error_sum_m=tuple(sums.tolist()),

@@ -41,6 +41,13 @@ def test_depth_errors_fall_into_the_range_of_the_true_depth():
     assert errors.shares == (2 / 7, 2 / 7)
 
 
+def test_depth_clipped_to_the_outer_borders_is_counted():
+    edges_m = (0.7, 1.0, 4.3)  # in float32, 0.7 is below and 4.3 above these numbers
+    reference = np.array(edges_m, np.float32)
+    errors = depth_error_by_range(reference, reference, np.ones(3, bool), edges_m)
+    assert errors.counts == (1, 2)
+
+
 def test_an_empty_range_has_no_mean():
     errors = depth_error_by_range(np.array([0.5]), np.array([0.5]), np.array([True]), EDGES_M)
     assert errors.mean_error_m == (0.0, None)
