@@ -29,9 +29,9 @@ ONLY_IMPORTED_IN = {
     "jinja2": ("wsm_data/view/",),
     # the peers we are measured against belong to bench/
     "embreex": (),
+    "isal": (),
     "plyfile": (),
     "skfmm": (),
-    "zlib_ng": (),
 }
 
 WITHOUT_A_TEST_OF_ITS_OWN: dict[str, str] = {

@@ -6,11 +6,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
-from isal import isal_zlib
+from zlib_ng import zlib_ng
 
 from wsm_data.errors import DataError, Reason
 
-_BUFFER_BYTES = 1 << 20
+_BUFFER_BYTES = 1 << 19
 _GZIP_MAGIC = b"\x1f\x8b"
 _POINTER = b"version https://git-lfs"
 
@@ -19,8 +19,8 @@ class GzipStream:
     """Sequential access to the content of a gzip file, several gzip members in a row included."""
 
     def __init__(self, file: BinaryIO, where: str):
-        # The reader behind `igzip.open`, taken directly: `IGzipFile.readinto` reads into a new bytes and copies it.
-        self._reader = isal_zlib._GzipReader(file, _BUFFER_BYTES)
+        # The reader behind `gzip_ng.open`, taken directly: `GzipNGFile.readinto` reads into new bytes and copies them.
+        self._reader = zlib_ng._GzipReader(file, _BUFFER_BYTES)
         self._where = where
         self._buffer = memoryview(bytearray(_BUFFER_BYTES))
         self._start = self._end = 0
@@ -80,7 +80,7 @@ class GzipStream:
             return int(self._reader.readinto(target))
         except EOFError as error:
             reason, what = Reason.ARCHIVE_TRUNCATED, f"the gzip stream ends without its end marker ({error})"
-        except (gzip.BadGzipFile, isal_zlib.error) as error:  # type: ignore[misc]
+        except (gzip.BadGzipFile, zlib_ng.error) as error:  # type: ignore[misc]
             reason, what = Reason.ARCHIVE_CORRUPT, f"the gzip stream is damaged ({error})"
         message = f"{self._where}: {what}, after {self.position} bytes of content; download it again"
         raise DataError(reason, message, {"position_bytes": self.position})

@@ -46,12 +46,11 @@ def walk_tar(path: Path, where: str, wanted: Callable[[str], bool]) -> Iterator[
         pax_global: dict[str, str] = {}
         while (header := _next_header(stream, where, pax_global)) is not None:
             _require_safe(header, where)
-            padding = -header.size % BLOCK_BYTES
+            stored = header.size + -header.size % BLOCK_BYTES
             if header.is_file and wanted(header.name):
-                yield Member(header.name, header.size, stream.take(header.size))
-                stream.skip(padding)
+                yield Member(header.name, header.size, stream.take(stored)[: header.size])
             else:
-                stream.skip(header.size + padding)
+                stream.skip(stored)
         _require_end(stream, where)
 
 
@@ -85,6 +84,8 @@ def _record(stream: GzipStream, header: TarHeader, where: str) -> bytes:
 
 
 def _overridden(header: TarHeader, overrides: dict[str, str], where: str) -> TarHeader:
+    if not overrides and header.size >= 0:
+        return header
     if any(key.startswith("GNU.sparse.") for key in overrides):
         raise _unsafe(header.name, "is stored sparse", where)
     size = overrides.get("size", str(header.size))
