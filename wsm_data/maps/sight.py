@@ -9,10 +9,9 @@ through the point where two opaque cells meet diagonally.
 import heapq
 import math
 
-import numpy as np
 from numba import njit
 
-from wsm_data.schema.arrays import BoolArray, Float64Array, Uint8Array
+from wsm_data.schema.arrays import BoolArray, Float64Array
 
 _EDGE = 1e-9
 """Widens an octant over its own border rays (slopes 0 and 1), and closes the ends of rows in `segment_is_clear`, cells.
@@ -30,20 +29,9 @@ def clip_slopes(lo: float, hi: float, offset: float, gradient: float) -> tuple[f
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
-def _narrow(cones: Float64Array, count: int, lo: float, hi: float, seen: bool, kept: bool, cut: Float64Array) -> int:
-    """Append the cone (lo, hi) of a row's stretch of sight, cut to the rays that can still improve something."""
-    if kept:
-        lo, hi = max(lo, cut[0]), min(hi, cut[1])
-    if lo < hi and (kept or not seen):
-        cones[count, 0], cones[count, 1] = lo, hi
-        count += 1
-    return count
-
-
-@njit(cache=True)  # type: ignore[untyped-decorator]
 def sweep_octant(  # one loop over rows, cones and cells: the heart of the field's speed, not worth cutting up
     opaque: BoolArray,
-    turns: Uint8Array,
+    turns: BoolArray,
     distance: Float64Array,
     parent: Float64Array,
     queue: list[tuple[float, int]],
@@ -56,13 +44,13 @@ def sweep_octant(  # one loop over rows, cones and cells: the heart of the field
     """Lower the distance of every cell centre that a source sees inside a cone of one octant.
 
     The sweep goes away from the source row by row. A cone (lo, hi) holds the slopes (side over forward) that are
-    still open; an opaque cell takes the slopes between its two outer corners out of it. Rays along which every centre
-    is already reached by a path shorter by `slack` are dropped: by the triangle inequality the other path
-    stays the shorter one all along the rest of the ray.
+    still open; an opaque cell takes the slopes between its two outer corners out of it. Rays along which centres are
+    already reached by a path shorter by `slack` are dropped: by the triangle inequality the other path stays the
+    shorter one all along the rest of the ray. The slack allows for the rays between the centres.
 
     Args:
         opaque: bool [cells], flat, with an opaque border all around, which ends every sweep.
-        turns: uint8 [cells]; cells that are not zero are queued when their distance falls.
+        turns: bool [cells]; cells that are queued when their distance falls.
         distance: float64 [cells] in cells, lowered in place.
         parent: float64 [cells, 2], position of the last turn before a queued cell, written in place.
         queue: heap of (distance, cell), pushed to in place.
@@ -74,49 +62,55 @@ def sweep_octant(  # one loop over rows, cones and cells: the heart of the field
         slack: see above, in cells.
     """
     origin, step_side, step_forward, side0, forward0 = frame
-    cut = np.empty(2)
-    now, after = cones[0], cones[1]
-    now[0, 0] = slopes[0] if slopes[0] > 0.0 else -_EDGE
-    now[0, 1] = slopes[1] if slopes[1] < 1.0 else 1.0 + _EDGE
-    count = 1
+    x0, y0, distance0 = source
+    cones[0, 0, 0] = slopes[0] if slopes[0] > 0.0 else -_EDGE
+    cones[0, 0, 1] = slopes[1] if slopes[1] < 1.0 else 1.0 + _EDGE
+    count, now = 1, 0
     row = math.floor(forward0)
     while count > 0:
         near, middle, far = row - forward0, row + 0.5 - forward0, row + 1 - forward0
-        following = 0
+        following, after = 0, 1 - now
         for i in range(count):
-            lo, hi = now[i, 0], now[i, 1]
-            cut[0], cut[1] = lo, hi
-            seen = kept = False
+            lo, hi = cones[now, i, 0], cones[now, i, 1]
+            keep_lo, keep_hi, seen, kept = lo, hi, False, False
+            column = math.floor(side0 + lo * max(near, 0.0))
             last = math.floor(side0 + hi * far)
-            for column in range(math.floor(side0 + lo * max(near, 0.0)), last + 1):
+            while True:
                 cell = origin + column * step_side + row * step_forward
-                if opaque[cell]:
-                    following = _narrow(after, following, lo, min(hi, (column - side0) / far), seen, kept, cut)
-                    lo = max(lo, (column + 1 - side0) / near) if near > 0.0 else hi
+                ends = column > last
+                if ends or opaque[cell]:
+                    # the stretch of sight before this cell goes on, cut to the rays that can still improve something
+                    top = hi if ends else min(hi, (column - side0) / far)
+                    if kept:
+                        keep_lo, top = max(lo, keep_lo), min(top, keep_hi)
+                    if keep_lo < top and (kept or not seen):
+                        cones[after, following, 0], cones[after, following, 1] = keep_lo, top
+                        following += 1
+                    if ends or near <= 0.0:
+                        break
+                    lo = max(lo, (column + 1 - side0) / near)
                     if lo >= hi:
                         break
-                    cut[0], cut[1] = lo, hi
-                    seen = kept = False
+                    keep_lo, keep_hi, seen, kept = lo, hi, False, False
                 elif middle > 0.0:
                     side = column + 0.5 - side0
                     slope = side / middle
                     if lo < slope < hi:
                         seen = True
-                        value = source[2] + math.sqrt(side * side + middle * middle)
+                        value = distance0 + math.sqrt(side * side + middle * middle)
                         if value < distance[cell] + slack:
-                            kept, cut[1] = True, hi
+                            kept, keep_hi = True, hi
                             if value < distance[cell]:
                                 distance[cell] = value
                                 if turns[cell]:
-                                    parent[cell, 0], parent[cell, 1] = source[0], source[1]
+                                    parent[cell, 0], parent[cell, 1] = x0, y0
                                     heapq.heappush(queue, (value, cell))
                         elif not kept:
-                            cut[0] = slope
-                        elif cut[1] == hi:
-                            cut[1] = slope
-            else:
-                following = _narrow(after, following, lo, hi, seen, kept, cut)
-        now, after, count = after, now, following
+                            keep_lo = slope - _EDGE
+                        elif keep_hi == hi:
+                            keep_hi = slope + _EDGE
+                column += 1
+        now, count = after, following
         row += 1
 
 
