@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator, PercentFormatter, ScalarFormatter
+from matplotlib.ticker import FuncFormatter, MaxNLocator, ScalarFormatter
 
 from wsm_data.codecs.quality import DepthErrors
 from wsm_data.schema.arrays import Float64Array
@@ -14,6 +14,7 @@ from wsm_data.view.report_data import StageSummary
 from wsm_data.view.style import BAR, BAR_SECOND, INK, MUTED, new_figure
 
 _WIDTH_PX, _HEIGHT_PX = 370, 236
+_BROAD_PX = 860
 _MAX_BINS = 24
 
 
@@ -33,7 +34,7 @@ def histogram(shown: Distribution) -> Figure:
     axes.set_title(f"median {written}", loc="right", fontsize=10, fontweight="normal", color=MUTED)
     axes.set(xlabel=shown.label, ylabel="clips (count)", xlim=_limits(edges, shown.share))
     axes.xaxis.set_major_locator(MaxNLocator(nbins=5))
-    axes.xaxis.set_major_formatter(PercentFormatter(1.0) if shown.share else ScalarFormatter(useOffset=False))
+    axes.xaxis.set_major_formatter(FuncFormatter(_percent) if shown.share else ScalarFormatter(useOffset=False))
     axes.yaxis.set_major_locator(MaxNLocator(nbins=4, integer=True))
     axes.grid(axis="y")
     return figure
@@ -47,6 +48,10 @@ def bin_edges(numbers: Float64Array, finest: float) -> Float64Array:
     # Half a millionth of a bin is given way, so that a value on an edge is not pushed off it by rounding.
     first, last = np.floor(low / width + 5e-7), np.floor(high / width + 5e-7) + 1
     return np.arange(first, last + 1) * width - 5e-7 * width
+
+
+def _percent(share: float, _position: int | None = None) -> str:
+    return f"{100 * share:.4g}%"
 
 
 def _limits(edges: Float64Array, share: bool) -> tuple[float, float]:
@@ -72,9 +77,10 @@ def depth_error_chart(errors: DepthErrors) -> Figure:
 
 def stage_chart(stages: Sequence[StageSummary]) -> Figure:
     """Time of each stage, summed over workers, as bars in the order of the flow; call within `figure_style()`."""
-    figure = new_figure(860, 90 + 34 * len(stages))
-    axes = figure.add_subplot()
-    figure.subplots_adjust(left=0.13, right=0.97, top=0.97, bottom=62 / (90 + 34 * len(stages)))
+    height_px = 90 + 34 * len(stages)
+    left_px = 50 + 8 * max((len(stage.name) for stage in stages), default=0)
+    figure = new_figure(_BROAD_PX, height_px)
+    axes = figure.add_axes((left_px / _BROAD_PX, 62 / height_px, 1 - (left_px + 26) / _BROAD_PX, 1 - 70 / height_px))
     seconds = [stage.seconds for stage in stages]
     axes.barh(range(len(stages)), seconds, height=0.66, color=BAR, lw=0)
     for row, stage in enumerate(stages):
@@ -92,6 +98,6 @@ def stage_chart(stages: Sequence[StageSummary]) -> Figure:
 
 def _chart() -> tuple[Figure, Axes]:
     figure = new_figure(_WIDTH_PX, _HEIGHT_PX)
-    axes = figure.add_axes((0.15, 0.23, 0.81, 0.65))
+    axes = figure.add_axes((0.21, 0.23, 0.75, 0.65))
     axes.tick_params(color=MUTED, labelcolor=INK)
     return figure, axes

@@ -150,5 +150,5 @@ def test_refused_units_whose_names_are_no_text_are_written_out(tmp_path, made):
 
 
 def test_the_page_adapts_to_dark_phone_and_print(html):
-    for rule in ("prefers-color-scheme: dark", "@media print", "max-width: 760px", "width=device-width"):
+    for rule in ("prefers-color-scheme: dark", "@media print", "screen and (max-width: 760px)", "width=device-width"):
         assert rule in html
