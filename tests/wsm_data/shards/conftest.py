@@ -1,5 +1,6 @@
 """Small valid clips, and a release of six of them in three scenes."""
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import SimpleNamespace
@@ -150,6 +151,24 @@ def pack(folder: Path, clips: Sequence[Clip], *, shard_bytes: int, **changes: ob
         codec_quality={"rgb_psnr_db": 25.5},
     )
     return finish_release(folder, facts, **(arguments | changes))
+
+
+@pytest.fixture(scope="session")
+def format_document() -> str:
+    """docs/format.md."""
+    return (Path(__file__).parents[3] / "docs" / "format.md").read_text()
+
+
+@pytest.fixture(scope="session")
+def words_of_table(format_document: str) -> Callable[[str], list[str]]:
+    """The code words in the first column of the table below a heading of docs/format.md."""
+
+    def words(heading: str) -> list[str]:
+        section = format_document.split(f"\n{heading}\n", 1)[1].split("\n#", 1)[0]
+        cells = [line.split("|")[1] for line in section.splitlines() if line.startswith("| `")]
+        return [word for cell in cells for word in re.findall(r"`([^`]+)`", cell)]
+
+    return words
 
 
 @pytest.fixture

@@ -7,6 +7,7 @@ from wsm_data.errors import IntegrityError
 from wsm_data.schema.clip import Clip
 from wsm_data.shards.fragment import build_fragment
 from wsm_data.shards.index_row import SCHEMA, IndexRow, index_row, parse_row, row_record
+from wsm_data.shards.members import MEMBER_NAMES
 
 
 @pytest.fixture
@@ -49,3 +50,10 @@ def test_the_largest_checksum_fits(row: IndexRow) -> None:
 def test_a_row_that_contradicts_itself_is_refused(row: IndexRow, column: str, value: object) -> None:
     with pytest.raises(IntegrityError, match=r"train-000004\.tar, clip synth_d435i/home_0001/000003: its row"):
         parse_row(row_record(row) | {column: value})
+
+
+def test_the_documentation_lists_every_column(words_of_table: Callable[[str], list[str]]) -> None:
+    listed: list[str] = []
+    for word in words_of_table("## index.parquet"):
+        listed += [word.replace("<member>", name) for name in MEMBER_NAMES] if "<member>" in word else [word]
+    assert sorted(listed) == sorted(SCHEMA.names)

@@ -1,3 +1,4 @@
+from dataclasses import fields
 from pathlib import Path
 
 import pytest
@@ -94,3 +95,8 @@ def test_a_unit_whose_name_is_not_utf_8_is_spelled_alike_in_both_files(tmp_path:
     [listed] = parse_inventory((tmp_path / "i").read_bytes(), "there")
     [written] = parse_quarantine((tmp_path / "q").read_bytes(), "there")
     assert listed.unit == listed.container == written["unit"] == "home_\\udc80"
+
+
+def test_the_documentation_names_every_column(format_document: str) -> None:
+    names = [f"`{item.name}`" for item in fields(InventoryRow)]
+    assert f"columns {', '.join(names[:-1])} and {names[-1]}" in format_document

@@ -63,3 +63,7 @@ def _changed(change: Callable[[dict[str, Any]], object]) -> Callable[[bytes], by
 def test_a_manifest_changed_in_any_way_is_refused(tiny: SimpleNamespace, change: Callable[[bytes], bytes]) -> None:
     with pytest.raises(IntegrityError, match="there must be the manifest of a release"):
         parse_manifest(change(manifest_bytes(tiny.manifest)), "there")
+
+
+def test_the_documentation_lists_every_key(words_of_table: Callable[[str], list[str]], tiny: SimpleNamespace) -> None:
+    assert sorted(words_of_table("## dataset.json")) == sorted(json.loads(manifest_bytes(tiny.manifest)))

@@ -36,3 +36,11 @@ def test_sizes_are_those_of_the_arrays(make_clip: Callable[..., Clip]) -> None:
         array = clip.arrays()[member.name]
         assert (member.array_size, member.shape, member.data_size) == (array.nbytes, array.shape, array.nbytes + 128)
         assert shape_of(member.name, axes) == array.shape
+
+
+def test_the_documentation_lists_every_member_with_its_dtype_and_axes(
+    words_of_table: Callable[[str], list[str]], format_document: str
+) -> None:
+    assert words_of_table("## A clip") == [*(f"{name}.npy" for name in MEMBERS), "meta.json"]
+    for name, (dtype, axes) in MEMBERS.items():
+        assert f"| `{name}.npy` | {dtype} | {', '.join(axes)} |" in format_document

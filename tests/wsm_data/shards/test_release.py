@@ -1,3 +1,4 @@
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -186,3 +187,14 @@ def test_a_clip_of_another_codec_than_the_release_is_refused(tiny: SimpleNamespa
 def test_a_clip_that_is_not_there_is_a_wrong_request(tiny: SimpleNamespace, make_clip: Callable[..., Clip]) -> None:
     with pytest.raises(ConfigError, match="has no clip 'a/b/c'"):
         open_release(tiny.folder).read_clip("a/b/c")
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # webdataset leaves its file open
+def test_the_snippets_of_the_documentation_run_beside_a_release(
+    tiny: SimpleNamespace, format_document: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tiny.folder.parent)
+    snippets = re.findall(r"```python\n(.*?)```", format_document, re.DOTALL)
+    assert len(snippets) == 4
+    for number, snippet in enumerate(snippets):
+        exec(compile(snippet, f"docs/format.md, snippet {number}", "exec"), {})  # noqa: S102 - our own document
