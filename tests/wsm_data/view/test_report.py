@@ -152,3 +152,10 @@ def test_refused_units_whose_names_are_no_text_are_written_out(tmp_path, made):
 def test_the_page_adapts_to_dark_phone_and_print(html):
     for rule in ("prefers-color-scheme: dark", "@media print", "screen and (max-width: 760px)", "width=device-width"):
         assert rule in html
+
+
+def test_a_release_of_refusals_alone_has_a_report(tmp_path, made):
+    release = made.release(tmp_path, {})
+    page = Page(report_html(ReportData(survey=survey_clips(release, made.codec)), release))
+    assert "0 clips" in page.text
+    assert "archive.truncated" in page.text
