@@ -1,6 +1,7 @@
 """What went into a run, unit by unit, and what became of it: the evidence that nothing was lost."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from pipelines.episode_table import read_episodes
@@ -10,38 +11,58 @@ from wsm_data.schema.verdict import Refusal
 from wsm_data.shards.inventory import InventoryRow, UnitState
 
 
-def inventory_of(index: Path, encode: Path, splits: Mapping[str, str], clips: Mapping[str, str]) -> list[InventoryRow]:
-    """One row for every trajectory, refused container and pending container of a run.
+@dataclass(frozen=True, kw_only=True)
+class Account:
+    """Everything that went in, once.
 
-    The container of a clip is left out: it tells the layout of the source, and a release does not depend on it.
+    Attributes:
+        rows: one for every trajectory, refused container and pending container.
+        quarantine: the refusals among them as a release keeps them, without times and fingerprints.
+    """
+
+    rows: tuple[InventoryRow, ...]
+    quarantine: tuple[Mapping[str, object], ...]
+
+
+def account_of(index: Path, encode: Path, splits: Mapping[str, str], clips: Mapping[str, str]) -> Account:
+    """Draw up the account of a run.
+
+    The container of a clip is left out: it tells the layout of the source, and a release does not depend on it. What a
+    missing map cost is told by the refusals of its trajectories in `encode`.
 
     Args:
         index: folder of `wsm index`.
         encode: folder of `wsm encode`.
         splits: split of every accepted trajectory, by its id.
-        clips: ids of the trajectories that became clips, with their content digests.
+        clips: content digests of the trajectories that became clips, by id.
     """
-    refusals = {refusal.unit: refusal for refusal in (*quarantine_of(index), *quarantine_of(encode))}
-    rows = [_refused_row(refusal) for refusal in refusals.values()]
-    rows += [InventoryRow(unit=unit, container=unit, state=UnitState.PENDING) for unit in pending_units(index)]
-    for row in read_episodes(index):
-        name = row.id.text
+    episodes = {row.id.text: row for row in read_episodes(index)}
+    at_index = _distinct(quarantine_of(index), episodes)
+    at_encode = [refusal for refusal in quarantine_of(encode) if refusal.unit in episodes]
+    refused = {refusal.unit for refusal in at_encode}
+    rows = [InventoryRow(unit=unit, container=unit, state=UnitState.PENDING) for unit in pending_units(index)]
+    for name, row in episodes.items():
         if name in clips:
-            rows.append(
-                InventoryRow(
-                    unit=name, container="", state=UnitState.CLIP, split=splits[name], source_digest=clips[name]
-                )
-            )
-        elif name not in refusals:
-            rows.append(
-                InventoryRow(unit=name, container=row.container, state=UnitState.PENDING, source_digest=row.digest)
-            )
-    return rows
+            state, split = UnitState.CLIP, splits[name]
+            rows.append(InventoryRow(unit=name, container="", state=state, split=split, source_digest=clips[name]))
+        elif name not in refused:
+            state, container = UnitState.PENDING, row.container
+            rows.append(InventoryRow(unit=name, container=container, state=state, source_digest=row.digest))
+    rows += [_refused_row(refusal) for refusal in (*at_index, *at_encode)]
+    quarantine = [{**refusal_json(one), "stage": "index"} for one in at_index]
+    quarantine += [{**refusal_json(one), "stage": "encode"} for one in at_encode]
+    return Account(rows=tuple(rows), quarantine=tuple(quarantine))
 
 
-def run_refusals(folders: Sequence[Path]) -> list[dict[str, object]]:
-    """Quarantine lines of the stages of a run, without stage fingerprints and times: what a release keeps."""
-    return [{**refusal_json(refusal), "stage": folder.name} for folder in folders for refusal in quarantine_of(folder)]
+def _distinct(refusals: Collection[Refusal], accepted: Collection[str]) -> list[Refusal]:
+    """Name a refused trajectory with its container where the same id was accepted, or refused, from another one."""
+    taken = set(accepted)
+    named = []
+    for refusal in sorted(refusals, key=lambda one: (one.unit, one.source)):
+        unit = refusal.unit if refusal.unit not in taken else f"{refusal.unit}@{refusal.source}"
+        taken.add(unit)
+        named.append(replace(refusal, unit=unit))
+    return named
 
 
 def _refused_row(refusal: Refusal) -> InventoryRow:

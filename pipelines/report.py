@@ -58,7 +58,7 @@ def stage_report(stage: str, out: Path, settled: Settled, ran: Sequence[str], se
         refused=sum(outcome.state == REFUSED for outcome in outcomes),
         pending=len(settled.pending),
         refusals=dict(sorted(refusals.items())),
-        facts=facts,
+        facts=dict(sorted(facts.items())),
         seconds=seconds,
     )
 

@@ -161,7 +161,7 @@ def _duplicate(container: str, row: Mapping[str, Any], kept: Mapping[str, Any]) 
     same = row["digest"] == kept["digest"]
     content = "the same content" if same else "other content"
     return Refusal(
-        unit=f"{row['id']}@{container}",
+        unit=row["id"],
         source=container,
         reason=Reason.EPISODE_DUPLICATE,
         message=f"{row['id']} stands in {kept['container']} too, with {content}; the one in {container} is left out: "

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from pipelines.config import INPUT
-from pipelines.inventory import inventory_of, run_refusals
+from pipelines.inventory import account_of
 from pipelines.layout import clips_folder, codec_path, release_folder
 from pipelines.source import indexed_source
 from pipelines.split_table import read_split
@@ -117,19 +117,16 @@ def _finish(config: PackConfig, context: StageContext, settled: Settled) -> Sequ
     plans = [unit.payload for unit in _list_units(config)]
     clips = _clips(config)
     folder = clips_folder(config.encode)
+    digests = {name: outcome.facts["source_digest"] for name, outcome in clips.items()}
+    account = account_of(config.index, config.encode, read_split(config.split), digests)
     finish_release(
         release_folder(context.out),
         _facts(config, clips),
         plans=plans,
         shards=[ShardInfo(**settled.outcomes[plan.name].facts["shard"]) for plan in plans],
         read_info=lambda key: read_fragment_info(fragment_path(folder, key)),
-        inventory=inventory_of(
-            config.index,
-            config.encode,
-            read_split(config.split),
-            {name: outcome.facts["source_digest"] for name, outcome in clips.items()},
-        ),
-        refusals=run_refusals([config.index, config.map, config.encode]),
+        inventory=account.rows,
+        refusals=account.quarantine,
     )
     return ()
 
