@@ -12,7 +12,7 @@ from typing import Any
 from pipelines.stage import Outcome
 from wsm_data.errors import ConfigError, IntegrityError, Reason
 from wsm_data.files.atomic import write_text
-from wsm_data.files.jsonlines import canonical_json, drop_torn_line, line_appender, read_lines, write_lines
+from wsm_data.files.jsonlines import drop_torn_line, line_appender, read_lines, write_lines
 from wsm_data.schema.verdict import Refusal
 
 STAGE_FILE, LEDGER_FILE = "stage.json", "ledger.jsonl"
@@ -93,9 +93,7 @@ def ledger_appender(folder: Path) -> Iterator[Callable[[LedgerEntry], LedgerEntr
     with line_appender(folder / LEDGER_FILE) as append_line:
 
         def append(entry: LedgerEntry) -> LedgerEntry:
-            line = {**_ledger_line(entry), "time": round(time.time(), 3)}
-            append_line(line)
-            return _entry_from_line(json.loads(canonical_json(line)))
+            return _entry_from_line(append_line({**_ledger_line(entry), "time": round(time.time(), 3)}))
 
         yield append
 

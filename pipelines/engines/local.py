@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
+from multiprocessing.resource_tracker import ensure_running
 from typing import Any, TypeVar
 
 from pipelines.engines.task import limit_threads, results_of, unless_failed
@@ -84,6 +85,7 @@ def _run_pool(tasks: Sequence[Any], work: Callable[[Any], Iterator[Any]], worker
 @contextmanager
 def _interrupts_held_back() -> Iterator[None]:
     """Ctrl-C is this process's to handle: workers inherit that it is blocked, here it is delivered at the end."""
+    ensure_running()  # what the first start of a process would do otherwise, and it unblocks Ctrl-C again
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield

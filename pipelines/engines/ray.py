@@ -76,4 +76,5 @@ def _next_of(stream: Any) -> list[Any]:
 
 def _stream(work: Callable[[Any], Iterator[Any]], task: Any) -> Iterator[Any]:
     limit_threads()
-    yield from results_of(work, task)
+    for result in results_of(work, task):  # noqa: UP028 - ray sends values, which `yield from` would hand on to `work`
+        yield result

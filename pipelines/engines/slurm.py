@@ -43,7 +43,7 @@ def run_slurm(
     """
     if not tasks:
         return
-    executor = submitit.AutoExecutor(folder=JOBS_FOLDER / "%j", cluster=cluster)
+    executor = submitit.AutoExecutor(folder=JOBS_FOLDER, cluster=cluster)
     executor.update_parameters(name="wsm", cpus_per_task=1, timeout_min=_TIME_LIMIT_MIN)
     shares = [tasks[first::workers] for first in range(min(workers, len(tasks)))]
     jobs = executor.map_array(partial(_work_on, work), shares)
@@ -78,7 +78,5 @@ def _results(job: Any) -> list[Any]:
     try:
         return list(job.result())
     except (submitit.core.utils.UncompletedJobError, submitit.core.utils.FailedJobError) as error:
-        message = (
-            f"job {job.job_id} gave no result ({error}); its log is {job.paths.stderr}. Run the same command again"
-        )
+        message = f"job {job.job_id} gave no result ({error}); logs are in {JOBS_FOLDER}. Run the same command again"
         return [TaskFailed(WsmError(message), "")]

@@ -386,7 +386,7 @@ def test_a_ledger_that_finds_no_room_is_a_full_disk_too(config, out, monkeypatch
 
     with monkeypatch.context() as patch:
         patch.setattr(os, "fsync", no_room)
-        with pytest.raises(WsmError, match="the disk of .* is full"):
+        with pytest.raises(WsmError, match=r"the disk of .* is full"):
             run_stage(COPY, config, out, ANY)
     assert run_stage(COPY, config, out, ANY).done == 3
 

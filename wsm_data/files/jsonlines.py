@@ -27,8 +27,8 @@ def canonical_json(value: object) -> str:
 
 
 @contextmanager
-def line_appender(path: Path) -> Iterator[Callable[[Mapping[str, object]], None]]:
-    """Open a file for more records; yields the function that appends one.
+def line_appender(path: Path) -> Iterator[Callable[[Mapping[str, object]], dict[str, object]]]:
+    """Open a file for more records; yields the function that appends one and returns it as `read_lines` will.
 
     A record is with the operating system when that function returns: it survives the death of this process. What
     survives a power cut is everything up to 0.2 s before, and all once the file is closed: one flush to disk a line
@@ -38,13 +38,15 @@ def line_appender(path: Path) -> Iterator[Callable[[Mapping[str, object]], None]
     with path.open("ab") as file:
         synced_s = time.monotonic()
 
-        def append(record: Mapping[str, object]) -> None:
+        def append(record: Mapping[str, object]) -> dict[str, object]:
             nonlocal synced_s
-            file.write(canonical_json(record).encode() + b"\n")
+            line = canonical_json(record).encode() + b"\n"
+            file.write(line)
             file.flush()
             if time.monotonic() - synced_s >= _SYNC_EVERY_S:
                 os.fsync(file.fileno())
                 synced_s = time.monotonic()
+            return dict(json.loads(line))
 
         try:
             yield append

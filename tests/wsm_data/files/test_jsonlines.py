@@ -63,6 +63,12 @@ def test_appended_lines_are_read_in_order(tmp_path):
     assert list(read_lines(path)) == [{"n": 0}, {"n": 1}, {"n": 2}]
 
 
+def test_an_append_returns_the_record_as_it_will_be_read(tmp_path):
+    with line_appender(tmp_path / "a.jsonl") as append:
+        returned = append({"words": ("a", "b"), "n": 1.0})
+    assert [returned] == list(read_lines(tmp_path / "a.jsonl")) == [{"words": ["a", "b"], "n": 1.0}]
+
+
 def test_an_appended_line_survives_the_death_of_its_writer(tmp_path):
     path = tmp_path / "a.jsonl"
     program = (
