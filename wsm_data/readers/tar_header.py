@@ -1,7 +1,7 @@
 """One 512-byte tar header, and the pax records that may stand before it (POSIX.1-2001 "pax", ustar and GNU tar)."""
 
 import zlib
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from wsm_data.errors import DataError, Reason
 
@@ -15,8 +15,7 @@ _CHECKSUM = slice(148, 156)
 _ADLER_MODULUS = 65521
 
 
-@dataclass(frozen=True, slots=True)
-class TarHeader:
+class TarHeader(NamedTuple):
     """What a header says of the bytes that follow it.
 
     Attributes:

@@ -45,9 +45,10 @@ def walk_tar(path: Path, where: str, wanted: Callable[[str], bool]) -> Iterator[
     with open_gzip(path, where) as stream:
         pax_global: dict[str, str] = {}
         while (header := _next_header(stream, where, pax_global)) is not None:
-            _require_safe(header, where)
+            is_file = header.is_file
+            _require_safe(header, is_file, where)
             stored = header.size + -header.size % BLOCK_BYTES
-            if header.is_file and wanted(header.name):
+            if is_file and wanted(header.name):
                 yield Member(header.name, header.size, stream.take(stored)[: header.size])
             else:
                 stream.skip(stored)
@@ -94,12 +95,12 @@ def _overridden(header: TarHeader, overrides: dict[str, str], where: str) -> Tar
     return TarHeader(overrides.get("path", header.name), int(size), header.kind)
 
 
-def _require_safe(header: TarHeader, where: str) -> None:
-    if not (header.is_file or header.is_folder):
+def _require_safe(header: TarHeader, is_file: bool, where: str) -> None:
+    if not (is_file or header.is_folder):
         raise _unsafe(header.name, f"is a link, a device or of an unknown kind ({header.kind!r})", where)
     if header.name.startswith("/"):
         raise _unsafe(header.name, "has an absolute path", where)
-    if ".." in header.name.split("/"):
+    if ".." in header.name and ".." in header.name.split("/"):
         raise _unsafe(header.name, "climbs out of the archive with '..'", where)
 
 

@@ -12,7 +12,7 @@ CONTENT = np.arange(750_000, dtype=">u4").tobytes()
 @settings(max_examples=30)
 @given(steps=st.lists(st.tuples(st.integers(0, 900_000), st.booleans()), max_size=12))
 def test_taking_and_skipping_reads_the_content_in_order(tmp_path_factory, steps):
-    """3 MB through a buffer of 1 MiB: pieces straddle its end, and some are larger than what is left of it."""
+    """3 MB through a buffer of half a MiB: pieces straddle its end, and some are larger than what is left of it."""
     path = tmp_path_factory.getbasetemp() / "content.gz"
     if not path.exists():
         path.write_bytes(gzip.compress(CONTENT, 1))

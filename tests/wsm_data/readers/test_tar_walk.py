@@ -58,7 +58,11 @@ def test_what_is_not_wanted_is_passed_over_but_still_checked(tmp_path):
 
 
 def test_a_member_larger_than_the_buffer_comes_whole(tmp_path):
-    files = {"a/small": b"s" * 1000, "a/large": bytes(range(256)) * 20_000, "a/last": b"e"}  # 5.1 MB over 1 MiB
+    files = {
+        "a/small": b"s" * 1000,
+        "a/large": bytes(range(256)) * 20_000,
+        "a/last": b"e",
+    }  # 5.1 MB, the buffer has 0.5
     assert walk(tmp_path / "a", gzip.compress(tar_of(files), 1)) == files
 
 
