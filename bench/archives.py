@@ -138,7 +138,8 @@ def main() -> None:
         "# Reading a scene archive",
         "",
         f"{FRAMES} JPEG and {FRAMES} 16-bit PNG files of 480x270 in a gzip tar of level 6, page cache warm, one "
-        f"thread, medians of {ROUNDS} alternating rounds; the ratio is taken within each round. MB are those of the content.",
+        f"thread, medians of {ROUNDS} alternating rounds; the ratio is taken within each round. MB are those "
+        "of the content.",
     ]
     for case, result in results.items():
         rows = [
