@@ -75,7 +75,7 @@ class SynthConfig:
     head_room_m: float = 0.05
     comfortable_clearance_m: float = 0.7
     floor_spacing_m: float = 0.02
-    surface_spacing_m: float = 0.03
+    surface_spacing_m: float = 0.04
     obstacle_slice_m: tuple[float, float] = (0.15, 0.4)
     noise_sigma: float = 1.5
     jpeg_quality: int = 92
