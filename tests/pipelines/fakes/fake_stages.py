@@ -133,3 +133,11 @@ def join(batch: Sequence[Unit], config: JoinConfig, context: StageContext) -> It
 COPY = Stage(name="copy", version=1, config_type=CopyConfig, list_units=list_copies, process=copy, finish=finish_copies)
 COPY_VERSION_2 = replace(COPY, version=2)
 JOIN = Stage(name="join", version=1, config_type=JoinConfig, list_units=list_joins, process=join)
+
+
+class CopyModule:
+    STAGE = COPY
+
+
+class JoinModule:
+    STAGE = JOIN

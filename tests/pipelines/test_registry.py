@@ -1,0 +1,16 @@
+"""The stages of the project."""
+
+import pytest
+
+from pipelines.registry import STAGES, load_stage
+from wsm_data.errors import ConfigError
+
+
+@pytest.mark.parametrize("name", [entry.name for entry in STAGES])
+def test_a_stage_is_found_under_its_name(name):
+    assert load_stage(name).name == name
+
+
+def test_an_unknown_stage_is_refused_with_the_known_ones():
+    with pytest.raises(ConfigError, match="there is no stage 'encod'; stages: synth, index, split, map, encode"):
+        load_stage("encod")
