@@ -15,15 +15,17 @@ import math
 
 import numpy as np
 from numba import njit
-from scipy.ndimage import minimum_filter1d
+from numpy.typing import NDArray
 
+from wsm_data.maps.bands import fill_bands
 from wsm_data.maps.footprint import traversable as where_traversable
 from wsm_data.maps.sight import clip_slopes, segment_is_clear, sweep_octant
 from wsm_data.schema.arrays import BoolArray, Float32Array, Float64Array, require_array
 from wsm_data.schema.occupancy import FREE, OccupancyGrid
 
-_TURN_CELLS = 3
-_SLACK_CELLS = 0.15
+_TURN_CELLS = 2
+_SLACK_CELLS = 0.3
+_GOAL, _NO_PARENT = -1, -2
 _REACH_PER_RADIUS = math.sqrt(2)
 """A free cell in a right-angled corner of walls is up to sqrt(2) radii away from the nearest traversable one."""
 
@@ -67,9 +69,8 @@ def geodesic_field(
 
     The goal region is the geodesic ball of radius r_g around the goal, so D = max(0, d - r_g) with d the distance to
     the goal itself. A cell that is neither traversable nor blocked (free, but nearer to an obstacle than the footprint
-    allows; experts drive there now and then) takes the best traversable cell that it sees within `reach_m`, plus the
-    straight way to it; nothing is propagated through such cells, so a gap that is too narrow stays closed. A
-    goal in such a place is connected likewise, and cells there that see the goal within `reach_m` go straight to it.
+    allows) takes the best traversable one that it sees within `reach_m`, plus the straight way to it (`bands.py`). A
+    goal in such a place is connected to all traversable cells that it sees within `reach_m`.
 
     Args:
         traversable: where the robot's centre may be; bool [Y, X].
@@ -96,7 +97,7 @@ def geodesic_field(
     opaque = np.pad(~traversable, 1, constant_values=True)
     walls = np.pad(blocked, 1, constant_values=True)
     distance = _solve(opaque, walls, x + 1, y + 1, reach_m / resolution_m)
-    distance = _reach_into_bands(opaque, walls, distance, x + 1, y + 1, reach_m / resolution_m)
+    distance = fill_bands(opaque, walls, distance, x + 1, y + 1, reach_m / resolution_m)
     return np.maximum(distance[1:-1, 1:-1] * resolution_m - goal_radius_m, 0.0).astype(np.float32)
 
 
@@ -153,10 +154,11 @@ def _sweep_wedge(
     opaque: BoolArray,
     turns: BoolArray,
     distance: Float64Array,
-    parent: Float64Array,
+    parent: NDArray[np.int32],
     queue: list[tuple[float, int]],
     cones: Float64Array,
     source: tuple[float, float, float],
+    index: int,
     wedge: tuple[float, float, float, float, float],
 ) -> None:
     """Sweep the directions between (dx, dy) and (ex, ey) from a source: wedge is (side, dx, dy, ex, ey).
@@ -179,7 +181,7 @@ def _sweep_wedge(
         origin = (0 if sign_x > 0 else columns - 1) + (0 if sign_y > 0 else (rows - 1) * columns)
         step_x, step_y = sign_x, sign_y * columns
         frame = (origin, step_x, step_y, x, y) if steep else (origin, step_y, step_x, y, x)
-        sweep_octant(opaque, turns, distance, parent, queue, cones, source, frame, (lo, hi), _SLACK_CELLS)
+        sweep_octant(opaque, turns, distance, parent, queue, cones, source, index, frame, (lo, hi), _SLACK_CELLS)
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
@@ -207,7 +209,7 @@ def _solve(opaque: BoolArray, walls: BoolArray, x: float, y: float, reach: float
     shape = rows, columns = opaque.shape
     convex, turns = _find_turns(opaque)
     distance = np.full(opaque.shape, np.inf)
-    parent = np.full((opaque.size, 2), np.nan)
+    parent = np.full(opaque.size, _NO_PARENT, np.int32)
     cones = np.empty((2, max(rows, columns) + 2, 2))
     done = np.zeros(opaque.size, np.bool_)
     flat, flat_turns, flat_distance = opaque.ravel(), turns.ravel(), distance.ravel()
@@ -218,101 +220,22 @@ def _solve(opaque: BoolArray, walls: BoolArray, x: float, y: float, reach: float
         queue = _start(opaque, walls, distance, x, y, reach)
     else:
         distance[int(y), int(x)] = math.sqrt((int(x) + 0.5 - x) ** 2 + (int(y) + 0.5 - y) ** 2)
-        _sweep_wedge(shape, flat, flat_turns, flat_distance, parent, queue, cones, (x, y, 0.0), everywhere)
+        _sweep_wedge(shape, flat, flat_turns, flat_distance, parent, queue, cones, (x, y, 0.0), _GOAL, everywhere)
     while len(queue) > 0:
         value, cell = heapq.heappop(queue)
         if done[cell] or value > flat_distance[cell]:
             continue
         done[cell] = True
-        row, column = cell // columns, cell % columns
+        row, column, before = cell // columns, cell % columns, parent[cell]
         source = (column + 0.5, row + 0.5, value)
-        if math.isnan(parent[cell, 0]):
-            _sweep_wedge(shape, flat, flat_turns, flat_distance, parent, queue, cones, source, everywhere)
+        if before == _NO_PARENT:
+            _sweep_wedge(shape, flat, flat_turns, flat_distance, parent, queue, cones, source, cell, everywhere)
             continue
-        dx, dy = source[0] - parent[cell, 0], source[1] - parent[cell, 1]
+        dx = source[0] - (x if before == _GOAL else before % columns + 0.5)
+        dy = source[1] - (y if before == _GOAL else before // columns + 0.5)
         for side in (1.0, -1.0):
             ex, ey = _bend(convex, row, column, dx, dy, side)
             if ex != 0.0:
                 wedge = (side, dx, dy, ex, ey)
-                _sweep_wedge(shape, flat, flat_turns, flat_distance, parent, queue, cones, source, wedge)
+                _sweep_wedge(shape, flat, flat_turns, flat_distance, parent, queue, cones, source, cell, wedge)
     return distance
-
-
-def _reach_into_bands(
-    opaque: BoolArray, walls: BoolArray, distance: Float64Array, x: float, y: float, reach: float
-) -> Float64Array:
-    """Distances with those of cells that are neither walls nor traversable: the best way over a cell in sight.
-
-    Args:
-        opaque: cells that are not traversable; bool [Y, X].
-        walls: cells through which nothing is seen; bool [Y, X].
-        distance: float64 [Y, X] in cells, infinite where not traversable.
-        x: the goal.
-        y: the goal.
-        reach: how far such a cell looks, in cells.
-    """
-    limit = int(reach)
-    offsets = np.arange(-limit, limit + 1)
-    straight = np.sqrt(offsets[:, None] ** 2 + offsets**2)
-    straight[straight > reach] = np.inf
-    least = minimum_filter1d(distance, 2 * limit + 1, axis=1, mode="constant", cval=np.inf)
-    return _fill_bands(opaque, walls, distance, straight, least, x, y, reach)
-
-
-@njit(cache=True)  # type: ignore[untyped-decorator]
-def _fill_bands(
-    opaque: BoolArray,
-    walls: BoolArray,
-    distance: Float64Array,
-    straight: Float64Array,
-    least: Float64Array,
-    x: float,
-    y: float,
-    reach: float,
-) -> Float64Array:
-    """The loop of `_reach_into_bands`; least is the least distance in reach to the left and right of each cell."""
-    filled = distance.copy()
-    for row in range(1, distance.shape[0] - 1):
-        for column in range(1, distance.shape[1] - 1):
-            if walls[row, column] or not opaque[row, column]:
-                continue
-            best = math.sqrt((column + 0.5 - x) ** 2 + (row + 0.5 - y) ** 2)
-            if best > reach or not segment_is_clear(walls, x, y, column + 0.5, row + 0.5):
-                best = np.inf
-            filled[row, column] = _best_in_sight(walls, distance, straight, least, row, column, best)
-    return filled
-
-
-@njit(cache=True)  # type: ignore[untyped-decorator]
-def _best_in_sight(
-    walls: BoolArray,
-    distance: Float64Array,
-    straight: Float64Array,
-    least: Float64Array,
-    row: int,
-    column: int,
-    best: float,
-) -> float:
-    """Least distance + straight way over the cells around one that it sees, `best` if none is less.
-
-    The least of all is looked at first: it is in sight of 99 cells in 100, and then no other needs a look.
-    """
-    limit = len(straight) // 2
-    top, bottom = max(0, row - limit), min(len(distance), row + limit + 1)
-    left, right = max(0, column - limit), min(distance.shape[1], column + limit + 1)
-    lowest, at_row, at_column = best, -1, -1
-    for i in range(top, bottom):
-        if least[i, column] + abs(i - row) >= lowest:
-            continue
-        for j in range(left, right):
-            value = distance[i, j] + straight[i - row + limit, j - column + limit]
-            if value < lowest:
-                lowest, at_row, at_column = value, i, j
-    if at_row < 0 or segment_is_clear(walls, column + 0.5, row + 0.5, at_column + 0.5, at_row + 0.5):
-        return lowest
-    for i in range(top, bottom):
-        for j in range(left, right):
-            value = distance[i, j] + straight[i - row + limit, j - column + limit]
-            if value < best and segment_is_clear(walls, column + 0.5, row + 0.5, j + 0.5, i + 0.5):
-                best = value
-    return best

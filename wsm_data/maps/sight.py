@@ -9,13 +9,18 @@ through the point where two opaque cells meet diagonally.
 import heapq
 import math
 
+import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from wsm_data.schema.arrays import BoolArray, Float64Array
 
 _EDGE = 1e-9
 """Widens an octant over its own border rays (slopes 0 and 1), and closes the ends of rows in `segment_is_clear`, cells.
 Slopes that a map's corners and centres can form differ by 1 / cells^2, a million times as much."""
+
+_SLACK_DECAY = 0.25
+"""The slack halves in the first four rows; measured with _SLACK_CELLS of the field."""
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
@@ -28,15 +33,16 @@ def clip_slopes(lo: float, hi: float, offset: float, gradient: float) -> tuple[f
     return (lo, hi) if offset < 0.0 else (0.0, 0.0)
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
 def sweep_octant(  # one loop over rows, cones and cells: the heart of the field's speed, not worth cutting up
     opaque: BoolArray,
     turns: BoolArray,
     distance: Float64Array,
-    parent: Float64Array,
+    parent: NDArray[np.int32],
     queue: list[tuple[float, int]],
     cones: Float64Array,
     source: tuple[float, float, float],
+    index: int,
     frame: tuple[int, int, int, float, float],
     slopes: tuple[float, float],
     slack: float,
@@ -46,37 +52,40 @@ def sweep_octant(  # one loop over rows, cones and cells: the heart of the field
     The sweep goes away from the source row by row. A cone (lo, hi) holds the slopes (side over forward) that are
     still open; an opaque cell takes the slopes between its two outer corners out of it. Rays along which centres are
     already reached by a path shorter by `slack` are dropped: by the triangle inequality the other path stays the
-    shorter one all along the rest of the ray. The slack allows for the rays between the centres.
+    shorter one all along the rest of the ray. The slack allows for the rays between the centres, which lie the closer
+    the farther the sweep has come, so it falls with the distance from the source.
 
     Args:
         opaque: bool [cells], flat, with an opaque border all around, which ends every sweep.
         turns: bool [cells]; cells that are queued when their distance falls.
         distance: float64 [cells] in cells, lowered in place.
-        parent: float64 [cells, 2], position of the last turn before a queued cell, written in place.
+        parent: int32 [cells], the source that gave a queued cell its distance, written in place.
         queue: heap of (distance, cell), pushed to in place.
         cones: float64 [2, n, 2] workspace, n above the longer side of the map.
         source: its (x, y) and distance, in cells.
+        index: what is written to `parent` for this source.
         frame: flat index of the octant's cell (0, 0), steps to the next cell sideways and forward, and the source's
             sideways and forward coordinate.
         slopes: the open cone, within [0, 1].
-        slack: see above, in cells.
+        slack: see above, at the source, in cells.
     """
     origin, step_side, step_forward, side0, forward0 = frame
-    x0, y0, distance0 = source
+    distance0 = source[2]
     cones[0, 0, 0] = slopes[0] if slopes[0] > 0.0 else -_EDGE
     cones[0, 0, 1] = slopes[1] if slopes[1] < 1.0 else 1.0 + _EDGE
     count, now = 1, 0
     row = math.floor(forward0)
     while count > 0:
         near, middle, far = row - forward0, row + 0.5 - forward0, row + 1 - forward0
-        following, after = 0, 1 - now
+        margin = slack / (1.0 + _SLACK_DECAY * max(middle, 0.0)) - distance0
+        following, after, first = 0, 1 - now, origin + row * step_forward
         for i in range(count):
             lo, hi = cones[now, i, 0], cones[now, i, 1]
             keep_lo, keep_hi, seen, kept = lo, hi, False, False
             column = math.floor(side0 + lo * max(near, 0.0))
             last = math.floor(side0 + hi * far)
             while True:
-                cell = origin + column * step_side + row * step_forward
+                cell = np.uintp(first + column * step_side)
                 ends = column > last
                 if ends or opaque[cell]:
                     # the stretch of sight before this cell goes on, cut to the rays that can still improve something
@@ -97,14 +106,16 @@ def sweep_octant(  # one loop over rows, cones and cells: the heart of the field
                     slope = side / middle
                     if lo < slope < hi:
                         seen = True
-                        value = distance0 + math.sqrt(side * side + middle * middle)
-                        if value < distance[cell] + slack:
+                        length = math.sqrt(side * side + middle * middle)
+                        known = distance[cell]
+                        if length < known + margin:
                             kept, keep_hi = True, hi
-                            if value < distance[cell]:
+                            value = distance0 + length
+                            if value < known:
                                 distance[cell] = value
                                 if turns[cell]:
-                                    parent[cell, 0], parent[cell, 1] = x0, y0
-                                    heapq.heappush(queue, (value, cell))
+                                    parent[cell] = index
+                                    heapq.heappush(queue, (value, first + column * step_side))
                         elif not kept:
                             keep_lo = slope - _EDGE
                         elif keep_hi == hi:
