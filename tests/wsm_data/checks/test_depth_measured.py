@@ -5,15 +5,17 @@ from wsm_data.errors import Reason
 
 
 def test_a_frame_without_any_measurement_is_refused_and_named():
-    depth_m = np.ones((6, 4, 5), np.float32)
-    depth_m[3] = 0
-    verdict = check_depth_measured(depth_m, "a")
-    assert (verdict.reason, verdict.measured["frame"]) == (Reason.DEPTH_NO_MEASUREMENT, 3)
+    valid = np.ones((6, 4, 5), bool)
+    valid[3] = valid[5] = False
+    verdict = check_depth_measured(valid, "a")
+    assert verdict.reason is Reason.DEPTH_NO_MEASUREMENT
+    assert verdict.measured == {"min_measured_share": 0.0, "mean_measured_share": 4 / 6, "frame": 3, "frames": 2}
+    assert verdict.message.startswith("a: ")
 
 
 def test_a_single_measured_pixel_is_enough():
-    depth_m = np.zeros((2, 4, 5), np.float32)
-    depth_m[:, 1, 1] = 2.5
-    verdict = check_depth_measured(depth_m, "a")
+    valid = np.zeros((2, 4, 5), bool)
+    valid[:, 1, 1] = True
+    verdict = check_depth_measured(valid, "a")
     assert verdict.keep
     assert verdict.measured["min_measured_share"] == 1 / 20
