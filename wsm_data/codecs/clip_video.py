@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from typing import TypeVar
 
+import cv2
 import numpy as np
 
 from wsm_data.codecs.base import TEMPORAL_RATIO
@@ -14,9 +15,11 @@ from wsm_data.schema.depth import DepthEncoding, DepthRange
 
 _Image = TypeVar("_Image", Uint8Array, Uint16Array)
 _HALF_RANGE = np.float32(127.5)
+_COLOURS = (np.arange(256, dtype=np.float32) - _HALF_RANGE) / _HALF_RANGE
+"""What each of the 256 levels becomes; float32 [256] in [-1, 1]."""
 
 
-def rgb_video(frames: Sequence[bytes], width: int, height: int, where: str) -> Float32Array:
+def rgb_video(frames: Sequence[bytes], width: int, height: int, where: str, length: int | None = None) -> Float32Array:
     """Decode and resize the JPEG frames of an episode.
 
     Args:
@@ -24,23 +27,30 @@ def rgb_video(frames: Sequence[bytes], width: int, height: int, where: str) -> F
         width: encoded width, px.
         height: encoded height, px.
         where: the episode, for messages; the number of the frame is added to it.
+        length: frames of the video, T where None; the last frame is repeated as in `pad_frames`, without a copy of all.
 
     Returns:
-        float32 [T, height, width, 3] in [-1, 1]: rgb / 127.5 - 1.
+        float32 [length, height, width, 3] in [-1, 1]: rgb / 127.5 - 1.
 
     Raises:
         DataError: FRAME_UNDECODABLE; FRAME_SIZE_MISMATCH where a frame's size differs from the first one's.
     """
-    video = np.empty((len(frames), height, width, 3), np.float32)
+    video = np.empty((_padded_count(frames, length), height, width, 3), np.float32)
     decoded = (decode_rgb(data, _frame_name(where, "colour", index)) for index, data in enumerate(frames))
-    for target, rgb_u8 in zip(video, _of_one_size(decoded, where, "colour"), strict=True):
-        np.subtract(resize_rgb(rgb_u8, width, height), _HALF_RANGE, out=target, dtype=np.float32)
-        target /= _HALF_RANGE
+    for index, rgb_u8 in enumerate(_of_one_size(decoded, where, "colour")):
+        cv2.LUT(resize_rgb(rgb_u8, width, height), _COLOURS, dst=video[index])
+    video[len(frames) :] = video[len(frames) - 1]
     return video
 
 
 def depth_video(
-    frames: Sequence[bytes], encoding: DepthEncoding, depth_range: DepthRange, width: int, height: int, where: str
+    frames: Sequence[bytes],
+    encoding: DepthEncoding,
+    depth_range: DepthRange,
+    width: int,
+    height: int,
+    where: str,
+    length: int | None = None,
 ) -> tuple[Float32Array, BoolArray]:
     """Decode, resize and normalise the depth frames of an episode.
 
@@ -51,23 +61,26 @@ def depth_video(
         width: encoded width, px.
         height: encoded height, px.
         where: the episode, for messages; the number of the frame is added to it.
+        length: frames of the video, T where None; the last frame is repeated as in `pad_frames`, without a copy of all.
 
     Returns:
-        The log-depth video, float32 [T, height, width, 3] in [-1, 1], a read-only view that repeats one channel; and
-        which pixels hold a measurement, bool [T, height, width].
+        The log-depth video, float32 [length, height, width, 3] in [-1, 1], a read-only view that repeats one channel;
+        and which pixels hold a measurement, bool [length, height, width].
 
     Raises:
         DataError: FRAME_UNDECODABLE, DEPTH_NOT_16_BIT; FRAME_SIZE_MISMATCH where a frame's size differs from the
             first one's.
     """
     normalised = log_depth_table(encoding, depth_range)
-    channel = np.empty((len(frames), height, width), np.float32)
-    valid = np.empty((len(frames), height, width), bool)
+    channel = np.empty((_padded_count(frames, length), height, width), np.float32)
+    valid = np.empty(channel.shape, bool)
     decoded = (decode_depth(data, _frame_name(where, "depth", index)) for index, data in enumerate(frames))
     for index, raw_u16 in enumerate(_of_one_size(decoded, where, "depth")):
         codes = resize_depth(raw_u16, width, height)
         np.take(normalised, codes, out=channel[index], mode="clip")  # every code is in the table; "raise" would buffer
         valid[index] = is_measured(codes, encoding)
+    for video in (channel, valid):
+        video[len(frames) :] = video[len(frames) - 1]
     return _three_channels(channel), valid
 
 
@@ -101,6 +114,13 @@ def pad_frames(video: np.ndarray, frames: int) -> np.ndarray:
     padded[: len(video)] = video
     padded[len(video) :] = video[-1]
     return padded
+
+
+def _padded_count(frames: Sequence[bytes], length: int | None) -> int:
+    count = len(frames) if length is None else length
+    if not 0 < len(frames) <= count:
+        raise ValueError(f"a video of {count} frames is made of 1 to {count} images, found {len(frames)}")
+    return count
 
 
 def _three_channels(channel: Float32Array) -> Float32Array:

@@ -111,8 +111,12 @@ def depth_error_by_range(
     error_m = np.abs(decoded_m[valid] - true_m)
     # In the dtype of the reference, so that depth clipped to the outer border lies on it and not a rounding outside.
     bins = np.asarray(edges_m, reference_m.dtype).astype(np.float64)
-    counts, _ = np.histogram(true_m, bins=bins)
-    sums, _ = np.histogram(true_m, bins=bins, weights=error_m)
+    ranges = len(bins) - 1
+    number = np.searchsorted(bins, true_m, side="right") - 1  # np.histogram would sort the pixels
+    number[true_m == bins[-1]] = ranges - 1
+    inside = (number >= 0) & (number < ranges)
+    counts = np.bincount(number[inside], minlength=ranges)
+    sums = np.bincount(number[inside], weights=error_m[inside], minlength=ranges)
     return DepthErrors(
         edges_m=tuple(float(edge) for edge in edges_m),
         error_sum_m=tuple(sums.tolist()),
