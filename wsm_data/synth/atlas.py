@@ -1,6 +1,6 @@
 """All textures of a home, with their smaller versions, packed for the renderer."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from functools import partial
 
@@ -74,10 +74,16 @@ class Atlas:
     mean: Float64Array
 
 
-def paint_atlas(rng: np.random.Generator) -> Atlas:
-    """Paint every layer; each has its own stream of random numbers, so that layers do not depend on one another."""
+def paint_atlas(rng: np.random.Generator, used: Collection[int]) -> Atlas:
+    """Paint the layers that are used; the others stay plain.
+
+    Each has its own stream of random numbers, so that no layer depends on which others are painted.
+    """
     streams = rng.spawn(len(Texture))
-    images = [_PAINTERS[texture][0](streams[texture], _PAINTERS[texture][1]) for texture in Texture]
+    images = []
+    for texture in Texture:
+        painter, size = _PAINTERS[texture] if texture in used else _PAINTERS[Texture.PLAIN]
+        images.append(painter(streams[texture], size))
     size_bits = np.array([image.shape[0].bit_length() - 1 for image in images], np.int64)
     offsets = np.zeros((len(images), int(size_bits.max()) + 1), np.int64)
     packed: list[NDArray[np.int64]] = []

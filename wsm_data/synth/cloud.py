@@ -12,7 +12,6 @@ OBSTACLE_RGB = (0, 0, 128)
 PATH_RGB = (0, 0, 0)
 _VERTEX = np.dtype([("xyz", "<f4", 3), ("rgb", "u1", 3)])
 _DARKEST, _BRIGHTEST = 70, 235
-_FLOOR_TOP_M = 1e-6
 
 
 def scene_cloud(home: Home, config: SynthConfig) -> PointCloud:
@@ -20,22 +19,14 @@ def scene_cloud(home: Home, config: SynthConfig) -> PointCloud:
 
     Floors are covered closely, so that what is free shows as free in maps of 0.05 m cells.
     """
-    points, patch = sample_surface(home.surface, config.surface_spacing_m)
-    above = ~home.floor_patch[patch]
-    floor, floor_patch = _floor_points(home, config.floor_spacing_m)
-    xyz = np.concatenate([floor, points[above]])
-    owner = np.concatenate([floor_patch, patch[above]])
+    floor, floor_patch = sample_surface(home.surface, config.floor_spacing_m, home.floor_patch)
+    other, other_patch = sample_surface(home.surface, config.surface_spacing_m, ~home.floor_patch)
+    xyz, owner = np.concatenate([floor, other]), np.concatenate([floor_patch, other_patch])
     grey = (_DARKEST + (_BRIGHTEST - _DARKEST) * home.mean_colour[owner].mean(axis=1)).astype(np.uint8)
     rgb = np.repeat(grey[:, None], 3, axis=1)
     low, high = config.obstacle_slice_m
     rgb[(xyz[:, 2] > low) & (xyz[:, 2] < high)] = OBSTACLE_RGB
     return PointCloud(xyz_m=xyz.astype(np.float32), rgb_u8=rgb)
-
-
-def _floor_points(home: Home, spacing_m: float) -> tuple[Float64Array, "np.ndarray"]:
-    points, patch = sample_surface(home.surface, spacing_m)
-    on_floor = home.floor_patch[patch]
-    return points[on_floor], patch[on_floor]
 
 
 def with_path(cloud: PointCloud, path_m: Float64Array) -> PointCloud:
@@ -51,7 +42,14 @@ def ply_bytes(cloud: PointCloud) -> bytes:
     """The cloud as a binary little-endian PLY file with float x, y, z and uchar red, green, blue."""
     properties = [f"property float {axis}" for axis in "xyz"]
     properties += [f"property uchar {channel}" for channel in ("red", "green", "blue")]
-    lines = ["ply", "format binary_little_endian 1.0", f"element vertex {len(cloud.xyz_m)}", *properties, "end_header", ""]
+    lines = [
+        "ply",
+        "format binary_little_endian 1.0",
+        f"element vertex {len(cloud.xyz_m)}",
+        *properties,
+        "end_header",
+        "",
+    ]
     vertices = np.empty(len(cloud.xyz_m), _VERTEX)
     vertices["xyz"], vertices["rgb"] = cloud.xyz_m, cloud.rgb_u8
     return "\n".join(lines).encode() + vertices.tobytes()

@@ -49,9 +49,9 @@ class SynthConfig:
         obstacle_slice_m: surfaces between these heights above the floor are marked as obstacles, m.
         noise_sigma: standard deviation of the sensor noise in RGB, of 255.
         jpeg_quality: quality of the colour images.
-        png_level: zlib level of the depth images; 1 is the fastest that compresses.
+        png_level: deflate level of the depth images (zlib-ng).
         metres_per_depth_unit: m of one step of the depth images.
-        archive_level: deflate level of the archives, 0 to 3 (isa-l).
+        archive_level: deflate level of the archives (zlib-ng); what is in them hardly compresses any further.
     """
 
     seed: int = 0
@@ -79,7 +79,7 @@ class SynthConfig:
     obstacle_slice_m: tuple[float, float] = (0.15, 0.4)
     noise_sigma: float = 1.5
     jpeg_quality: int = 92
-    png_level: int = 1
+    png_level: int = 2
     metres_per_depth_unit: float = 1e-4
     archive_level: int = 1
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import BinaryIO
 
-from isal import isal_zlib
+from zlib_ng import zlib_ng
 
 from wsm_data.files.atomic import atomic_file
 
@@ -41,7 +41,7 @@ def write_folder(path: Path, members: Iterable[Member]) -> None:
 def write_archive(path: Path, top: str, members: Iterable[Member], level: int) -> None:
     """Write all members below the folder `top` of a tar.gz whose bytes depend on nothing but them and the level."""
     with atomic_file(path) as file:
-        deflate = isal_zlib.compressobj(level, isal_zlib.DEFLATED, _GZIP)
+        deflate = zlib_ng.compressobj(level, zlib_ng.DEFLATED, _GZIP)
         written = 0
         for name, data in members:
             written += _add(file, deflate, f"{top}/{name}", data)
@@ -51,7 +51,7 @@ def write_archive(path: Path, top: str, members: Iterable[Member], level: int) -
         file.write(deflate.flush())
 
 
-def _add(file: BinaryIO, deflate: "isal_zlib.Compress", name: str, data: bytes) -> int:
+def _add(file: BinaryIO, deflate: "zlib_ng._Compress", name: str, data: bytes) -> int:
     info = tarfile.TarInfo(name)
     info.size, info.mode = len(data), 0o644
     header = info.tobuf(tarfile.USTAR_FORMAT)

@@ -6,18 +6,16 @@ import numpy as np
 
 from wsm_data.synth.furniture import bath, bedding, decor, kitchen, seating, storage, tables
 from wsm_data.synth.furniture.piece import Piece, Rectangle, group, move
-from wsm_data.synth.placing import RoomLayout, at_wall, hang, place_at_wall, place_in_middle, start_layout, wall_stretch
+from wsm_data.synth.placing import RoomLayout, at_wall, hang, place_at_wall, place_in_middle, start_layout
 from wsm_data.synth.plan import FloorPlan, Opening, Room, side_of
 from wsm_data.synth.style import Style
-from wsm_data.synth.surface import Material, Surface
+from wsm_data.synth.surface import Material
 from wsm_data.synth.walls import door_leaf
 
 _OPPOSITE = {"south": "north", "north": "south", "west": "east", "east": "west"}
 
 
-def furnish_room(
-    rng: np.random.Generator, room: Room, plan: FloorPlan, style: Style, fullness: float
-) -> list[Piece]:
+def furnish_room(rng: np.random.Generator, room: Room, plan: FloorPlan, style: Style, fullness: float) -> list[Piece]:
     """Furniture of one room, in world coordinates.
 
     Args:
@@ -88,10 +86,9 @@ def _sofa_corner(rng: np.random.Generator, style: Style, width_m: float) -> Piec
 
 
 def _kitchen(rng: np.random.Generator, layout: RoomLayout, style: Style, fullness: float) -> None:
-    placed = None
-    for length in (3.4, 2.9, 2.4, 1.9):
-        fridge = length > 2.0
-        placed = placed or place_at_wall(rng, layout, kitchen.kitchen_run(rng, style, length, fridge), front_m=0.8)
+    for length, high in ((3.4, True), (2.9, True), (2.5, True), (3.0, False), (2.4, False), (1.8, False)):
+        if place_at_wall(rng, layout, kitchen.kitchen_run(rng, style, length, high), front_m=0.8) is not None:
+            break
     yaws = (0.0, np.pi / 2)
     big = layout.room.area_m2 > 13 * fullness
     sets: list[Piece] = [tables.dining_set(rng, style, 4), tables.round_dining_set(rng, style)]
@@ -221,14 +218,3 @@ def threshold(opening: Opening) -> Rectangle:
     if opening.axis == 0:
         return opening.start, opening.low, opening.end, opening.high
     return opening.low, opening.start, opening.high, opening.end
-
-
-def wall_middle(room: Room, side: str) -> float:
-    """Middle of a wall along its axis."""
-    low, high = wall_stretch(room, side)
-    return (low + high) / 2
-
-
-def joined_surface(pieces: list[Piece]) -> list[Surface]:
-    """Surfaces of all pieces, one each."""
-    return [item.surface for item in pieces]

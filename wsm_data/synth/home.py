@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from wsm_data.schema.arrays import BoolArray, Float64Array
-from wsm_data.synth.atlas import Atlas, paint_atlas
+from wsm_data.synth.atlas import paint_atlas
 from wsm_data.synth.furnishing import furnish_room, threshold
 from wsm_data.synth.furniture.piece import Piece, Rectangle
 from wsm_data.synth.lighting import VOXEL_M, bake
@@ -54,39 +54,36 @@ def make_home(seed: int, scene_index: int) -> Home:
     plan = make_plan(rng_plan)
     style = choose_style(rng_style)
     furniture = _furnish(rng_rooms, plan, style)
-    shell, floor_flags = _shell(rng_style, plan, style)
+    shell = _shell(rng_style, plan, style)
     parts = [*shell, *(item.surface for item in furniture)]
     surface = join(parts)
     lamps = tuple(lamp for item in furniture for lamp in item.lamps)
-    atlas = paint_atlas(rng_paint)
+    atlas = paint_atlas(rng_paint, set(surface.texture.tolist()))
     light = bake(surface, sample_surface(surface, 0.8 * VOXEL_M)[0], plan, lamps)
     return Home(
         plan=plan,
         surface=surface,
         mesh=build_mesh(surface, [len(part) for part in parts], atlas, light),
         mean_colour=np.clip(surface.tint * atlas.mean[surface.texture], 0.0, 1.0),
-        floor_patch=_floor_patches(surface, floor_flags),
+        floor_patch=_floor_patches(surface),
     )
 
 
-def _shell(rng: np.random.Generator, plan: FloorPlan, style: Style) -> tuple[list[Surface], list[Rectangle]]:
-    """Shells of all rooms and what is in their openings; and the floors' rectangles."""
+def _shell(rng: np.random.Generator, plan: FloorPlan, style: Style) -> list[Surface]:
+    """Shells of all rooms, and what is in their openings."""
     parts = []
     looks = [choose_room_style(rng, room, style, number) for number, room in enumerate(plan.rooms)]
     for room, look in zip(plan.rooms, looks, strict=True):
         parts.append(room_shell(room, plan, look, style, str(rng.choice(SIDES))))
     wood = Material(texture=Texture.WOOD, tint=style.scheme.dark, repeat_m=0.6)
     view = Texture.VIEW_GARDEN if rng.random() < 0.6 else Texture.VIEW_TOWN
-    parts += [opening_surface(opening, plan.rooms, style, wood, view) for opening in plan.openings]
-    floors = [(room.x0, room.y0, room.x1, room.y1) for room in plan.rooms]
-    return parts, floors + [threshold(opening) for opening in plan.openings if opening.kind != "window"]
+    return parts + [opening_surface(opening, plan.rooms, style, wood, view) for opening in plan.openings]
 
 
-def _floor_patches(surface: Surface, floors: Sequence[Rectangle]) -> BoolArray:
-    """Patches that lie on the floor's plane and show up: floors and thresholds, not rugs."""
-    flat = (surface.points_m[..., 2] == 0.0).all(axis=1) & surface.quad & (surface.normals[:, 0, 2] > 0.5)
-    del floors
-    return np.asarray(flat)
+def _floor_patches(surface: Surface) -> BoolArray:
+    """Patches in the floor's plane that face up: floors and thresholds, not rugs."""
+    flat = (surface.points_m[..., 2] == 0.0).all(axis=1)
+    return np.asarray(flat & surface.quad & (surface.normals[:, 0, 2] > 0.5))
 
 
 def _furnish(rng: np.random.Generator, plan: FloorPlan, style: Style) -> list[Piece]:
@@ -145,6 +142,3 @@ def room_at(plan: FloorPlan, xy_m: tuple[float, float]) -> Room | None:
     """The room a point is in; None in a doorway or outside."""
     x, y = xy_m
     return next((room for room in plan.rooms if room.x0 <= x <= room.x1 and room.y0 <= y <= room.y1), None)
-
-
-__all__ = ["Atlas", "Home", "home_trimesh", "make_home", "room_at"]

@@ -1,13 +1,12 @@
 """Frames as files: JPEG with a little sensor noise, and 16-bit PNG of depth."""
 
 import struct
-import zlib
 
 import numpy as np
 import simplejpeg
-from isal import isal_zlib
 from numba import njit
 from numpy.typing import NDArray
+from zlib_ng import zlib_ng
 
 from wsm_data.schema.arrays import Float32Array, Uint8Array, Uint16Array
 
@@ -32,7 +31,7 @@ def add_noise(rgb_u8: Uint8Array, tile: NDArray[np.int16], rng: np.random.Genera
     return noisy
 
 
-@njit(cache=True)
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def _add_clipped(picture: Uint8Array, noise: NDArray[np.int16], out: Uint8Array) -> None:
     height, width, channels = picture.shape
     for y in range(height):
@@ -53,9 +52,9 @@ def depth_codes(depth_m: Float32Array, metres_per_unit: float) -> Uint16Array:
 
 
 def encode_png_16(codes: Uint16Array, level: int) -> bytes:
-    """A 16-bit grey PNG [H, W]: every row less the row above it, deflated by isa-l (levels 0 to 3).
+    """A 16-bit grey PNG [H, W]: every row less the row above it, deflated by zlib-ng.
 
-    Ten times as fast as libpng through OpenCV at the same size, and its bytes depend on nothing but the codes.
+    Several times as fast as libpng through OpenCV at the same size.
     """
     height, width = codes.shape
     samples = codes.astype(">u2").view(np.uint8).reshape(height, 2 * width)
@@ -64,9 +63,9 @@ def encode_png_16(codes: Uint16Array, level: int) -> bytes:
     rows[0, 1:] = samples[0]
     np.subtract(samples[1:], samples[:-1], out=rows[1:, 1:])
     header = struct.pack(">IIBBBBB", width, height, 16, 0, 0, 0, 0)
-    chunks = [(b"IHDR", header), (b"IDAT", isal_zlib.compress(rows.tobytes(), level)), (b"IEND", b"")]
+    chunks = [(b"IHDR", header), (b"IDAT", zlib_ng.compress(rows.tobytes(), level)), (b"IEND", b"")]
     return _PNG_SIGNATURE + b"".join(_chunk(name, data) for name, data in chunks)
 
 
 def _chunk(name: bytes, data: bytes) -> bytes:
-    return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
+    return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib_ng.crc32(name + data))

@@ -15,7 +15,7 @@ from wsm_data.synth.furniture.piece import Lamp
 from wsm_data.synth.plan import FloorPlan, Opening
 from wsm_data.synth.surface import Surface
 
-NODE_SPACING_M = 0.12
+NODE_SPACING_M = 0.14
 VOXEL_M = 0.05
 _LIFT_M = 0.085
 """Rays start this far off their surface, so that its own voxels do not shade it, m."""
@@ -23,8 +23,8 @@ _LIFT_M = 0.085
 _SKY_REACH_M = 1.3
 _GAMMA = 2.2
 _DAYLIGHT = (1.0, 1.05, 1.12)
-_AMBIENT = (0.40, 0.40, 0.41)
-_EXPOSURE = 1.0
+_AMBIENT = (0.30, 0.30, 0.315)
+_FAINT = 0.004  # a source that adds less than this to the three channels is not followed
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,9 +54,11 @@ def bake(surface: Surface, points_m: Float64Array, plan: FloorPlan, lamps: tuple
     position, normal = _nodes(surface, patch)
     sources, powers, facing = _sources(plan, lamps)
     directions = _hemisphere()
-    light = np.empty_like(position)
-    _gather(position, normal, filled, origin, sources, powers, facing, directions, np.array(_AMBIENT), light)
-    tone = _tone(light * _EXPOSURE)
+    light = np.zeros_like(position)
+    wanted = np.ones(len(position), np.bool_)
+    wanted[patch[~surface.quad, 0] + 3] = False  # the fourth node of a triangle is outside it
+    _gather(position, normal, filled, origin, sources, powers, facing, directions, np.array(_AMBIENT), wanted, light)
+    tone = _tone(light)
     owner = np.repeat(np.arange(len(patch)), patch[:, 1] * patch[:, 2])
     emission = surface.emission[owner, None]
     samples = (tone * (1 - emission) + emission) * surface.tint[owner]
@@ -106,7 +108,7 @@ def _nodes(surface: Surface, patch: NDArray[np.int64]) -> tuple[Float64Array, Fl
 
 
 def _straight_triangles(samples: Float64Array, quad: BoolArray, patch: NDArray[np.int64]) -> Float64Array:
-    """Make light linear over triangles: their fourth node, outside them, continues the plane of the other three."""
+    """Make light linear over triangles: their fourth node continues the plane of the other three."""
     first = patch[~quad, 0]
     samples[first + 3] = np.maximum(samples[first + 1] + samples[first + 2] - samples[first], 0.0)
     return samples
@@ -144,14 +146,14 @@ def _window_points(o: Opening) -> tuple[list[Float64Array], Float64Array]:
     return points, inward
 
 
-def _hemisphere(count: int = 20) -> Float64Array:
+def _hemisphere(count: int = 18) -> Float64Array:
     """Cosine-weighted directions around +z: a spiral, the same at every node so that light is smooth."""
     i = np.arange(count) + 0.5
     radius, angle = np.sqrt(i / count), i * np.pi * (3 - np.sqrt(5))
     return np.column_stack([radius * np.cos(angle), radius * np.sin(angle), np.sqrt(1 - i / count)])
 
 
-@njit(cache=True)
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def _march(filled: BoolArray, origin: Float64Array, p: Float64Array, d: Float64Array, length: float) -> float:
     """Way a ray goes before it meets a filled box, at most `length`, in steps of 0.7 of a box.
 
@@ -166,7 +168,7 @@ def _march(filled: BoolArray, origin: Float64Array, p: Float64Array, d: Float64A
         i, j, m = int(x), int(y), int(z)
         if x < 0 or y < 0 or z < 0 or i >= nx or j >= ny or m >= nz:
             return length
-        if not filled[i, j, m]:
+        if not filled[np.uintp(i), np.uintp(j), np.uintp(m)]:  # unsigned: no test for counting from the end
             outside = True
         elif outside or k > 4:
             return k * step
@@ -176,7 +178,7 @@ def _march(filled: BoolArray, origin: Float64Array, p: Float64Array, d: Float64A
     return length
 
 
-@njit(cache=True)
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def _gather(
     position: Float64Array,
     normal: Float64Array,
@@ -187,11 +189,14 @@ def _gather(
     facing: Float64Array,
     directions: Float64Array,
     ambient: Float64Array,
+    wanted: BoolArray,
     light: Float64Array,
 ) -> None:
-    """Linear light at every node: what reaches it from the sources, and the ambient share that is not blocked."""
+    """Linear light at the wanted nodes: what reaches it from the sources, and the ambient share that is not blocked."""
     d, start, side, other = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for n in range(len(position)):
+        if not wanted[n]:
+            continue
         nx, ny, nz = normal[n]
         for k in range(3):
             start[k] = position[n, k] + _LIFT_M * normal[n, k]
@@ -209,7 +214,7 @@ def _gather(
             for k in range(3):
                 d[k] = directions[i, 0] * side[k] + directions[i, 1] * other[k] + directions[i, 2] * normal[n, k]
             open_share += _march(filled, origin, start, d, _SKY_REACH_M) / _SKY_REACH_M
-        open_share = 0.3 + 0.7 * open_share / len(directions)  # some light is thrown back by whatever blocks it
+        open_share = 0.25 + 0.75 * open_share / len(directions)  # some light is thrown back by whatever blocks it
         for k in range(3):
             light[n, k] = ambient[k] * open_share
         for s in range(len(sources)):
@@ -226,7 +231,7 @@ def _gather(
             strength = cosine / (distance2 + 0.25)
             if facing[s, 0] != 0.0 or facing[s, 1] != 0.0:
                 strength *= max(0.0, -(d[0] * facing[s, 0] + d[1] * facing[s, 1]) / distance)
-            if strength * (powers[s, 0] + powers[s, 1] + powers[s, 2]) < 0.002:
+            if strength * (powers[s, 0] + powers[s, 1] + powers[s, 2]) < _FAINT:
                 continue
             for k in range(3):
                 d[k] /= distance

@@ -67,9 +67,7 @@ def _positive(uv: Float64Array) -> Float64Array:
     return uv - np.floor(lowest)[:, None] + 1.0
 
 
-def _clusters(
-    points: Float64Array, cluster: NDArray[np.int64], count: int
-) -> tuple[NDArray[np.int64], Float64Array]:
+def _clusters(points: Float64Array, cluster: NDArray[np.int64], count: int) -> tuple[NDArray[np.int64], Float64Array]:
     """First triangle of each cluster and F; centre and radius of a sphere around each."""
     start = np.searchsorted(cluster, np.arange(count + 1))
     sphere = np.zeros((count, 4))

@@ -39,7 +39,11 @@ def _statistics(episode: int, start: int, length: int) -> dict[str, object]:
 
 
 def _info(lengths: Sequence[int], intrinsics: Intrinsics) -> dict[str, object]:
-    image = {"dtype": "image", "shape": [intrinsics.height, intrinsics.width, 3], "names": ["height", "width", "channel"]}
+    image = {
+        "dtype": "image",
+        "shape": [intrinsics.height, intrinsics.width, 3],
+        "names": ["height", "width", "channel"],
+    }
     depth = {**image, "dtype": "image", "shape": [intrinsics.height, intrinsics.width, 1]}
     return {
         "codebase_version": "v2.1",

@@ -16,7 +16,9 @@ def clouds(
         roughness: 0 is white noise, 1 and more are clouds.
         stretch: how much longer the features are along u and along v than they would be.
     """
-    v, u = np.meshgrid(np.fft.fftfreq(size) * size * stretch[1], np.fft.rfftfreq(size) * size * stretch[0], indexing="ij")
+    v, u = np.meshgrid(
+        np.fft.fftfreq(size) * size * stretch[1], np.fft.rfftfreq(size) * size * stretch[0], indexing="ij"
+    )
     amplitude = 1.0 / np.maximum(np.hypot(u, v), 1.0) ** roughness
     amplitude[0, 0] = 0.0
     field = np.fft.irfft2(np.fft.rfft2(rng.standard_normal((size, size))) * amplitude, s=(size, size))
@@ -30,7 +32,7 @@ def normalised(field: Float64Array) -> Float64Array:
 
 
 def coordinates(size: int) -> tuple[Float64Array, Float64Array]:
-    """u and v of the texel centres in [0, 1), both [size, size]; u runs along rows."""
+    """Coordinates u and v of the texel centres in [0, 1), both [size, size]; u runs along rows."""
     steps = (np.arange(size) + 0.5) / size
     return np.broadcast_to(steps[None, :], (size, size)), np.broadcast_to(steps[:, None], (size, size))
 

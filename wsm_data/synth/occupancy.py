@@ -14,6 +14,9 @@ from wsm_data.synth.sampling import sample_surface
 CELL_M = 0.05
 """Side of a planning cell, m (spec/interndata_n1.md: maps at 0.05 m)."""
 
+_SPACING_M = 0.02
+_TALLEST_M = 2.0
+
 
 @dataclass(frozen=True, kw_only=True)
 class SceneColumns:
@@ -58,7 +61,9 @@ class Clearance:
 
 def scene_columns(home: Home) -> SceneColumns:
     """Sort the surfaces of a home into cells; done once, then asked for every height of robot."""
-    points, patch = sample_surface(home.surface, 0.02)
+    points, patch = sample_surface(home.surface, _SPACING_M)
+    within = points[:, 2] < _TALLEST_M
+    points, patch = points[within], patch[within]
     first = np.floor(points[:, :2].min(axis=0) / CELL_M).astype(np.int64) - 1
     last = np.floor(points[:, :2].max(axis=0) / CELL_M).astype(np.int64) + 1
     columns, rows = (last - first + 1).tolist()

@@ -125,7 +125,9 @@ def place_at_wall(
     return None
 
 
-def place_in_middle(rng: np.random.Generator, layout: RoomLayout, item: Piece, gap_m: float, yaws: Sequence[float]) -> bool:
+def place_in_middle(
+    rng: np.random.Generator, layout: RoomLayout, item: Piece, gap_m: float, yaws: Sequence[float]
+) -> bool:
     """Put a piece somewhere away from the walls; returns whether it fitted."""
     room = layout.room
     for _ in range(_TRIES):

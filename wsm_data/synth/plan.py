@@ -103,8 +103,9 @@ def make_plan(rng: np.random.Generator) -> FloorPlan:
     depth = hall_1 + PARTITION_M + north
     strip = float(rng.uniform(7.2, 8.6)) if open_end else float(rng.uniform(9.6, 11.4))
     rooms = [Room(kind="hall", x0=0.0, y0=hall_0, x1=strip, y1=hall_1)]
-    for y0, y1 in ((0.0, south), (hall_1 + PARTITION_M, depth)):
-        rooms += [Room(kind="", x0=a, y0=y0, x1=b, y1=y1) for a, b in _split(rng, strip)]
+    for number, (y0, y1) in enumerate(((0.0, south), (hall_1 + PARTITION_M, depth))):
+        stretches = _split(rng, strip, with_bath=number == 0)
+        rooms += [Room(kind="", x0=a, y0=y0, x1=b, y1=y1) for a, b in stretches]
     if open_end:
         end = strip + PARTITION_M + float(rng.uniform(4.2, 5.2))
         rooms.append(Room(kind="living", x0=strip + PARTITION_M, y0=0.0, x1=end, y1=depth))
@@ -114,17 +115,20 @@ def make_plan(rng: np.random.Generator) -> FloorPlan:
     return _turned_and_moved(rng, plan)
 
 
-def _split(rng: np.random.Generator, length: float) -> list[tuple[float, float]]:
-    """Two or three stretches of a strip, a partition between neighbours."""
-    most = min(3, int((length + PARTITION_M) / (MIN_ROOM_WIDTH_M + PARTITION_M)))
+def _split(rng: np.random.Generator, length: float, with_bath: bool) -> list[tuple[float, float]]:
+    """Two to four stretches of a strip, a partition between neighbours; with a bath the first or last is narrow."""
+    bath = [float(rng.uniform(1.9, 2.4))] if with_bath else []
+    rest = length - sum(width + PARTITION_M for width in bath)
+    most = min(3, int((rest + PARTITION_M) / (MIN_ROOM_WIDTH_M + PARTITION_M)))
     count = most if most < 3 or rng.random() < 0.5 else 2
-    spare = length - count * MIN_ROOM_WIDTH_M - (count - 1) * PARTITION_M
-    shares = rng.dirichlet(np.full(count, 3.0)) * spare
+    spare = rest - count * MIN_ROOM_WIDTH_M - (count - 1) * PARTITION_M
+    widths = [MIN_ROOM_WIDTH_M + float(share) * spare for share in rng.dirichlet(np.full(count, 3.0))]
+    widths = widths + bath if rng.random() < 0.5 else bath + widths
     stretches, start = [], 0.0
-    for share in shares:
-        stretches.append((start, start + MIN_ROOM_WIDTH_M + float(share)))
-        start = stretches[-1][1] + PARTITION_M
-    stretches[-1] = (stretches[-1][0], length)
+    for width in widths:
+        stretches.append((start, start + width))
+        start += width + PARTITION_M
+    stretches[-1] = (stretches[-1][0], length)  # rounding must not leave a slit
     return stretches
 
 
@@ -135,7 +139,7 @@ def _name_rooms(rng: np.random.Generator, rooms: Sequence[Room]) -> list[Room]:
     rest = ["bedroom", "study", "bedroom", "study", "bedroom"]
     if rng.random() < 0.5:
         rest[:2] = rest[1::-1]
-    kinds += ["kitchen", *rest][: len(unnamed) - len(kinds) - 1] + ["bath"]
+    kinds += [*["kitchen", *rest][: len(unnamed) - len(kinds) - 1], "bath"]
     named = list(rooms)
     for i, kind in zip(unnamed, kinds, strict=True):
         named[i] = replace(rooms[i], kind=kind)
@@ -143,24 +147,27 @@ def _name_rooms(rng: np.random.Generator, rooms: Sequence[Room]) -> list[Room]:
 
 
 def _doors(rng: np.random.Generator, rooms: Sequence[Room]) -> list[Opening]:
-    """One way from the hall into each room."""
+    """One way from the hall into each room: a wide one into the living room, doors into the others."""
     hall = rooms[0]
     doors = []
     for room in rooms[1:]:
         if room.x0 > hall.x1:
-            margin = float(rng.uniform(0.1, 0.2))
-            wall = {"low": hall.x1, "high": room.x0}
-            doors.append(Opening(kind="passage", axis=1, start=hall.y0 + margin, end=hall.y1 - margin, z1=2.2, **wall))
+            start, end = hall.y0 + float(rng.uniform(0.1, 0.2)), hall.y1 - float(rng.uniform(0.1, 0.2))
+            doors.append(Opening(kind="passage", axis=1, start=start, end=end, low=hall.x1, high=room.x0, z1=2.2))
             continue
         wide = room.kind == "living"
         width = float(rng.uniform(1.2, 1.5)) if wide else float(rng.uniform(0.84, 0.98))
-        corner = float(rng.uniform(0.14, 0.22))
-        free = room.x1 - room.x0 - width
-        offset = {0: corner, 1: free - corner, 2: float(rng.uniform(0.3, 0.7)) * free}[int(rng.choice(3, p=[0.4, 0.4, 0.2]))]
-        wall = {"low": room.y1, "high": hall.y0} if room.y1 < hall.y1 else {"low": hall.y1, "high": room.y0}
-        start = room.x0 + offset
-        doors.append(Opening(kind="passage" if wide else "door", axis=0, start=start, end=start + width, **wall))
+        start = _door_position(rng, room.x0, room.x1 - width)
+        low, high = (room.y1, hall.y0) if room.y1 < hall.y1 else (hall.y1, room.y0)
+        kind = "passage" if wide else "door"
+        doors.append(Opening(kind=kind, axis=0, start=start, end=start + width, low=low, high=high))
     return doors
+
+
+def _door_position(rng: np.random.Generator, first: float, last: float) -> float:
+    """Near one of the two corners, where an open leaf is out of the way, or now and then in between."""
+    corner, between = float(rng.uniform(0.14, 0.22)), float(rng.uniform(0.3, 0.7))
+    return float(rng.choice([first + corner, last - corner, first + between * (last - first)], p=[0.4, 0.4, 0.2]))
 
 
 def _passages(rng: np.random.Generator, rooms: Sequence[Room]) -> list[Opening]:
@@ -201,12 +208,22 @@ def _windows_in_wall(
     count = 2 if length > 3.9 else 1
     width = min(0.7 if kind in ("bath", "hall") else float(rng.uniform(1.1, 1.7)), length / count - 0.6)
     sill = {"living": float(rng.choice([0.35, 0.75])), "bath": 1.3, "kitchen": 1.1}.get(kind, 0.85)
-    wall = {"low": face - FACADE_M, "high": face} if outside < 0 else {"low": face, "high": face + FACADE_M}
+    outer = (face - FACADE_M, face) if outside < 0 else (face, face + FACADE_M)
     found = []
     for i in range(1 if kind in ("bath", "hall") else count):
         centre = low + length * (i + 0.5) / count + float(rng.uniform(-0.1, 0.1))
-        start, end = centre - width / 2, centre + width / 2
-        found.append(Opening(kind="window", axis=axis, start=start, end=end, z0=sill, z1=2.15, outside=outside, **wall))
+        hole = Opening(
+            kind="window",
+            axis=axis,
+            start=centre - width / 2,
+            end=centre + width / 2,
+            low=outer[0],
+            high=outer[1],
+            z0=sill,
+            z1=2.15,
+            outside=outside,
+        )
+        found.append(hole)
     return found
 
 

@@ -22,7 +22,7 @@ LIGHT_BITS = 10  # of a light sample, of which 512 stands for 1; its interpolati
 PLANES = 19  # per drawn triangle: u/z, v/z, s/z, t/z, 1/z as planes over the image, texel area, triangle, 2 limits
 
 
-@njit(cache=True)
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def _cluster_is_visible(sphere: Float64Array, M: Float64Array, limits: Float64Array) -> bool:
     """Whether a bounding sphere (x, y, z, radius) reaches into the view, whose four side planes are in `limits`."""
     x = M[0, 0] * sphere[0] + M[0, 1] * sphere[1] + M[0, 2] * sphere[2] + M[0, 3]
@@ -30,13 +30,13 @@ def _cluster_is_visible(sphere: Float64Array, M: Float64Array, limits: Float64Ar
     z = M[2, 0] * sphere[0] + M[2, 1] * sphere[1] + M[2, 2] * sphere[2] + M[2, 3]
     if z < -sphere[3]:
         return False
-    for i in range(4):
+    for i in range(4):  # noqa: SIM110  numba compiles no generators
         if limits[i, 0] * x + limits[i, 1] * y + limits[i, 2] * z < -sphere[3]:
             return False
     return True
 
 
-@njit(cache=True)
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def _camera_corners(corners: Float64Array, M: Float64Array, v: Float64Array) -> None:
     for i in range(3):
         x, y, z = corners[i, 0], corners[i, 1], corners[i, 2]
@@ -44,7 +44,7 @@ def _camera_corners(corners: Float64Array, M: Float64Array, v: Float64Array) -> 
             v[i, k] = M[k, 0] * x + M[k, 1] * y + M[k, 2] * z + M[k, 3]
 
 
-@njit(cache=True)
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def _image_bounds(v: Float64Array, fx: float, fy: float, cx: float, cy: float, bounds: Float64Array) -> bool:
     """Bounds (x0, x1, y0, y1) in pixels of the part in front of the near plane; False where there is none."""
     bounds[0], bounds[1], bounds[2], bounds[3] = np.inf, -np.inf, np.inf, -np.inf
@@ -62,13 +62,13 @@ def _image_bounds(v: Float64Array, fx: float, fy: float, cx: float, cy: float, b
     return seen
 
 
-@njit(cache=True)
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def _extend(bounds: Float64Array, x: float, y: float) -> None:
     bounds[0], bounds[1] = min(bounds[0], x), max(bounds[1], x)
     bounds[2], bounds[3] = min(bounds[2], y), max(bounds[3], y)
 
 
-@njit(cache=True)
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def _edge_planes(v: Float64Array, fx: float, fy: float, cx: float, cy: float, E: Float64Array) -> float:
     """Edge functions as planes over the image, E[i] = (a, b, c); returns the determinant."""
     for i in range(3):
@@ -82,7 +82,7 @@ def _edge_planes(v: Float64Array, fx: float, fy: float, cx: float, cy: float, E:
     return v[0, 0] * cross_x + v[0, 1] * cross_y + v[0, 2] * cross_z
 
 
-@njit(cache=True)
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def _fill(
     E: Float64Array, W: Float64Array, bounds: Float64Array, index: int, inv_z: Float64Array, ids: "np.ndarray"
 ) -> bool:
@@ -119,7 +119,7 @@ def _fill(
     return drawn
 
 
-@njit(cache=True)
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def _attribute_planes(
     E: Float64Array, W: Float64Array, det: float, uv: Float64Array, st: Float64Array, out: Float64Array
 ) -> None:
@@ -137,7 +137,7 @@ def _attribute_planes(
     out[15] = abs(out[0] * minor_0 - out[1] * minor_1 + out[2] * minor_2)
 
 
-@njit(cache=True)
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def draw(
     points: Float64Array,
     uv: Float64Array,
@@ -197,7 +197,7 @@ def draw(
     return count
 
 
-@njit(cache=True)
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def _view_limits(fx: float, fy: float, cx: float, cy: float, width: int, height: int) -> Float64Array:
     """Inward unit normals of the four planes through the camera and the image's outermost pixel centres."""
     limits = np.zeros((4, 3))
@@ -210,7 +210,7 @@ def _view_limits(fx: float, fy: float, cx: float, cy: float, width: int, height:
     return limits
 
 
-@njit(cache=True)
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def _blend(samples: "np.ndarray", i00: int, i10: int, i01: int, i11: int, fs: int, ft: int, bits: int) -> int:
     """Bilinear mean of four packed samples; fs, ft of `bits` bits. The weights sum to 1 << bits exactly."""
     w11 = (fs * ft) >> bits
@@ -221,7 +221,7 @@ def _blend(samples: "np.ndarray", i00: int, i10: int, i01: int, i11: int, fs: in
     return low + samples[np.uintp(i01)] * w01 + samples[np.uintp(i11)] * w11
 
 
-@njit(cache=True)
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def _texel(texels: "np.ndarray", offsets: "np.ndarray", size_bits: int, u: float, v: float, area: float) -> int:
     """Texture colour, 8.8 bits a channel, bilinear on the level whose texels are about as large as the pixel."""
     level = 0
@@ -239,7 +239,7 @@ def _texel(texels: "np.ndarray", offsets: "np.ndarray", size_bits: int, u: float
     return _blend(texels, row0 + u0, row0 + u1, row1 + u0, row1 + u1, fixed_u & 255, fixed_v & 255, 8)
 
 
-@njit(cache=True)
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def _light(light: "np.ndarray", offset: int, columns: int, rows: int, s: float, t: float) -> int:
     """Light colour, 10.6 bits a channel, bilinear between the nodes of a patch."""
     fixed_s = min(max(int(s * 64.0), 0), ((columns - 1) << 6) - 1)
@@ -248,7 +248,7 @@ def _light(light: "np.ndarray", offset: int, columns: int, rows: int, s: float, 
     return _blend(light, i, i + 1, i + columns, i + columns + 1, fixed_s & 63, fixed_t & 63, 6)
 
 
-@njit(cache=True)
+@njit(cache=True)  # type: ignore[untyped-decorator]
 def shade(
     inv_z: Float64Array,
     ids: "np.ndarray",

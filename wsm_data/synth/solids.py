@@ -1,21 +1,18 @@
 """Solids that furniture is built of: boxes, lathed and round bodies, tubes, sheets."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from wsm_data.schema.arrays import Float64Array
-from wsm_data.synth.surface import Material, Point, Surface, join, make_surface, parallelogram
+from wsm_data.synth.surface import Material, Point, Surface, make_surface, parallelograms
 
-# name of a face: which corner of the box (0 low, 1 high per axis), and the axes of its edges with their signs
-_FACES: dict[str, tuple[tuple[int, int, int], tuple[int, int], tuple[int, int]]] = {
-    "+x": ((1, 0, 0), (1, 1), (2, 1)),
-    "-x": ((0, 1, 0), (1, -1), (2, 1)),
-    "+y": ((1, 1, 0), (0, -1), (2, 1)),
-    "-y": ((0, 0, 0), (0, 1), (2, 1)),
-    "+z": ((0, 0, 1), (0, 1), (1, 1)),
-    "-z": ((0, 1, 0), (0, 1), (1, -1)),
-}
+_FACES = ("+x", "-x", "+y", "-y", "+z", "-z")
+# per face: which corner of the box it starts from (0 low, 1 high), and the directions of its edges; u x v is outward
+_STARTS = np.array([(1, 0, 0), (0, 1, 0), (1, 1, 0), (0, 0, 0), (0, 0, 1), (0, 1, 0)])
+_EDGES_U = np.array([(0, 1, 0), (0, -1, 0), (-1, 0, 0), (1, 0, 0), (1, 0, 0), (1, 0, 0)], np.float64)
+_EDGES_V = np.array([(0, 0, 1), (0, 0, 1), (0, 0, 1), (0, 0, 1), (0, 1, 0), (0, -1, 0)], np.float64)
 
 
 def box(low_m: Point, high_m: Point, material: Material, skip: Sequence[str] = (), fit: Sequence[str] = ()) -> Surface:
@@ -28,28 +25,19 @@ def box(low_m: Point, high_m: Point, material: Material, skip: Sequence[str] = (
         skip: faces that are never seen, such as `-z` for what stands on the floor.
         fit: faces that the texture covers exactly once.
     """
-    corners = np.array([low_m, high_m], np.float64)
-    size = corners[1] - corners[0]
-    faces = []
-    for name, (corner, edge_u, edge_v) in _FACES.items():
-        if name in skip:
-            continue
-        start = tuple(float(corners[corner[axis], axis]) for axis in range(3))
-        u, v = _axis_edge(size, *edge_u), _axis_edge(size, *edge_v)
-        faces.append(parallelogram((start[0], start[1], start[2]), u, v, material, fit=name in fit))
-    return join(faces)
+    low, high = np.array(low_m, np.float64), np.array(high_m, np.float64)
+    kept = np.array([name not in skip for name in _FACES])
+    covered = np.array([name in fit for name in _FACES])[kept]
+    starts, size = np.where(_STARTS[kept] == 1, high, low), high - low
+    return parallelograms(starts, _EDGES_U[kept] * size, _EDGES_V[kept] * size, material, fit=covered)
 
 
-def block(centre_xy_m: tuple[float, float], z_m: float, size_m: Point, material: Material, **kwargs: Sequence[str]) -> Surface:
+def block(
+    centre_xy_m: tuple[float, float], z_m: float, size_m: Point, material: Material, **kwargs: Sequence[str]
+) -> Surface:
     """A box given by the centre of its underside and its size; further arguments as for `box`."""
     (x, y), (w, d, h) = centre_xy_m, size_m
     return box((x - w / 2, y - d / 2, z_m), (x + w / 2, y + d / 2, z_m + h), material, **kwargs)
-
-
-def _axis_edge(size: Float64Array, axis: int, sign: int) -> Point:
-    edge = [0.0, 0.0, 0.0]
-    edge[axis] = sign * float(size[axis])
-    return edge[0], edge[1], edge[2]
 
 
 def grid_surface(points_m: Float64Array, normals: Float64Array, uv: Float64Array, material: Material) -> Surface:
@@ -131,9 +119,16 @@ def cushion(
     points[-1] = points[0]
     normals = body(2.0 - e) / half
     normals /= np.maximum(np.linalg.norm(normals, axis=-1, keepdims=True), 1e-12)
-    around, up = longitude / (2 * np.pi) * 2 * (half[0] + half[1]) * 2, latitude / np.pi * 2 * (half[1] + half[2])
-    uv = np.stack(np.broadcast_arrays(around, -up), axis=-1) / material.repeat_m
-    return grid_surface(points, normals, uv, material)
+    return _box_mapped(grid_surface(points, normals, np.zeros((*points.shape[:2], 2)), material), material)
+
+
+def _box_mapped(surface: Surface, material: Material) -> Surface:
+    """The triangles with their texture laid on along the axis they face most, so that it has no poles."""
+    p = surface.points_m
+    facing = np.abs(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])).argmax(axis=1)
+    axes = np.array([(1, 2), (0, 2), (0, 1)])[facing]
+    uv = np.take_along_axis(p, np.repeat(axes[:, None], 3, axis=1), axis=2) / material.repeat_m
+    return replace(surface, uv=uv)
 
 
 def sheet(

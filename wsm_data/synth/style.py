@@ -162,7 +162,9 @@ def _floor(rng: np.random.Generator, room: Room, style: Style) -> Material:
         tint = [(0.86, 0.84, 0.8), (0.62, 0.63, 0.65), (0.82, 0.68, 0.56)][int(rng.integers(3))]
         return Material(texture=Texture.TILES, tint=tint, repeat_m=1.6)
     if room.kind == "bedroom" and rng.random() < 0.4:
-        return Material(texture=Texture.CARPET, tint=_pale(style.scheme.strong[int(rng.integers(4))], 0.4), repeat_m=0.9)
+        return Material(
+            texture=Texture.CARPET, tint=_pale(style.scheme.strong[int(rng.integers(4))], 0.4), repeat_m=0.9
+        )
     if room.kind in ("living", "study") and rng.random() < 0.35:
         return Material(texture=Texture.PARQUET, tint=style.scheme.floor, repeat_m=2.0)
     return Material(texture=Texture.PLANKS, tint=style.scheme.floor, repeat_m=1.8)

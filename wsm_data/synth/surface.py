@@ -135,36 +135,47 @@ def placed(surface: Surface, xyz_m: Point, yaw_rad: float = 0.0) -> Surface:
     return Surface(**changed, **rest)
 
 
-def parallelogram(corner_m: Point, edge_u_m: Point, edge_v_m: Point, material: Material, fit: bool = False) -> Surface:
-    """One flat patch. With `fit` the texture covers it once, upright when edge v points up; else it repeats."""
-    a, u, v = (np.array(value, np.float64) for value in (corner_m, edge_u_m, edge_v_m))
-    normal = np.cross(u, v)
-    normal /= np.linalg.norm(normal)
-    if fit:
-        uv = np.array([[0.0, 1.0], [1.0, 1.0], [0.0, 0.0]])
-    else:
-        uv = _planar_uv(a, u, v) / material.repeat_m
-    points = np.stack([a, a + u, a + v])
-    return make_surface(points[None], np.tile(normal, (1, 3, 1)), uv[None], True, material)
+def parallelograms(
+    corners_m: Float64Array,
+    edges_u_m: Float64Array,
+    edges_v_m: Float64Array,
+    material: Material,
+    fit: BoolArray | None = None,
+    turn: bool = True,
+) -> Surface:
+    """Flat patches of one material.
 
-
-def _planar_uv(a: Float64Array, u: Float64Array, v: Float64Array) -> Float64Array:
-    """Coordinates along the edges, measured from the frame's origin: neighbours in one plane continue one another.
-
-    The texture's u axis, along which wood grain runs, follows the longer edge.
+    Args:
+        corners_m: a; [N, 3].
+        edges_u_m: b - a; [N, 3].
+        edges_v_m: d - a; [N, 3].
+        material: of all of them.
+        fit: which patches the texture covers exactly once, upright when edge v points up; the others it repeats over,
+            measured from the frame's origin, so that neighbours in one plane continue one another.
+        turn: let the texture's u axis, along which wood grain runs, follow the longer edge; else always edge u.
     """
-    length_u, length_v = float(np.linalg.norm(u)), float(np.linalg.norm(v))
-    along_u, along_v = float(a @ u) / length_u, float(a @ v) / length_v
-    uv = np.array([[along_u, -along_v], [along_u + length_u, -along_v], [along_u, -along_v - length_v]])
-    return uv if length_u >= length_v else uv[:, ::-1]
+    a, u, v = (np.asarray(array, np.float64) for array in (corners_m, edges_u_m, edges_v_m))
+    length_u, length_v = (np.sqrt((edge * edge).sum(axis=1)) for edge in (u, v))
+    normal = np.stack([u[:, i] * v[:, j] - u[:, j] * v[:, i] for i, j in ((1, 2), (2, 0), (0, 1))], axis=1)
+    normal /= np.sqrt((normal * normal).sum(axis=1))[:, None]
+    s, t = (a * u).sum(axis=1) / length_u, -(a * v).sum(axis=1) / length_v
+    uv = np.stack([s, t, s + length_u, t, s, t - length_v], axis=1).reshape(-1, 3, 2) / material.repeat_m
+    if turn:
+        upright = (length_v > length_u)[:, None, None]
+        uv = np.where(upright, uv[..., ::-1], uv)
+    if fit is not None:
+        uv[fit] = ((0.0, 1.0), (1.0, 1.0), (0.0, 0.0))
+    points = np.stack([a, a + u, a + v], axis=1)
+    return make_surface(points, np.repeat(normal[:, None], 3, axis=1), uv, True, material)
+
+
+def parallelogram(corner_m: Point, edge_u_m: Point, edge_v_m: Point, material: Material, fit: bool = False) -> Surface:
+    """One flat patch; with `fit` the texture covers it once, upright when edge v points up."""
+    a, u, v = (np.array([value]) for value in (corner_m, edge_u_m, edge_v_m))
+    return parallelograms(a, u, v, material, fit=np.array([fit]))
 
 
 def panel(corner_m: Point, edge_u_m: Point, edge_v_m: Point, material: Material) -> Surface:
     """One flat patch whose texture is upright and never turned: u along edge u, v down against edge v (walls)."""
-    surface = parallelogram(corner_m, edge_u_m, edge_v_m, material)
-    a, u, v = np.array(corner_m), np.array(edge_u_m), np.array(edge_v_m)
-    length_u, length_v = float(np.linalg.norm(u)), float(np.linalg.norm(v))
-    along_u, along_v = float(a @ u) / length_u, float(a @ v) / length_v
-    uv = np.array([[along_u, -along_v], [along_u + length_u, -along_v], [along_u, -along_v - length_v]])
-    kept = {field.name: getattr(surface, field.name) for field in fields(Surface) if field.name != "uv"}
-    return Surface(uv=uv[None] / material.repeat_m, **kept)
+    a, u, v = (np.array([value]) for value in (corner_m, edge_u_m, edge_v_m))
+    return parallelograms(a, u, v, material, turn=False)

@@ -166,8 +166,8 @@ def bark(rng: np.random.Generator, size: int) -> Float64Array:
 
 def duvet(rng: np.random.Generator, size: int) -> Float64Array:
     """Bedding with soft folds, to be tinted."""
-    fold = np.abs(clouds(rng, size, 1.9, (1.0, 1.6)) - 0.5) * 2
-    value = 0.82 + 0.16 * smooth_step(fold, 0.0, 0.5) + 0.03 * clouds(rng, size, 0.3)
+    fold = np.abs(clouds(rng, size, 2.2, (1.0, 1.6)) - 0.5) * 2
+    value = 0.9 + 0.07 * smooth_step(fold, 0.0, 0.8) + 0.03 * clouds(rng, size, 0.3)
     return np.repeat(np.clip(value, 0, 1)[..., None], 3, axis=-1)
 
 

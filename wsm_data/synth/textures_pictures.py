@@ -1,7 +1,5 @@
 """Textures that are pictures: views from the window, paintings, rugs, books, screens; [size, size, 3] in [0, 1]."""
 
-from collections.abc import Callable
-
 import numpy as np
 
 from wsm_data.schema.arrays import Float64Array
@@ -25,7 +23,7 @@ def pick_palette(rng: np.random.Generator) -> Palette:
 
 def garden_view(rng: np.random.Generator, size: int) -> Float64Array:
     """Sky, trees, a lawn."""
-    u, v = coordinates(size)
+    _, v = coordinates(size)
     sky = mix((0.55, 0.75, 0.97), (0.93, 0.97, 1.0), np.clip(v * 1.6, 0, 1))
     sky = sky + (1 - sky) * 0.8 * smooth_step(clouds(rng, size, 1.6, (0.5, 1.0)), 0.55, 0.9)[..., None]
     picture = sky
@@ -56,7 +54,7 @@ def town_view(rng: np.random.Generator, size: int) -> Float64Array:
 
 def hills(rng: np.random.Generator, size: int) -> Float64Array:
     """Painting: ridge behind ridge in the haze."""
-    u, v = coordinates(size)
+    _, v = coordinates(size)
     ground, *tones = pick_palette(rng)
     picture = mix(ground, tones[2], smooth_step(v, 0.1, 0.6) * 0.6)
     for i in range(5):
@@ -198,6 +196,3 @@ def _piled(rng: np.random.Generator, picture: Float64Array) -> Float64Array:
     """Wool instead of flat colour."""
     size = picture.shape[0]
     return np.clip(picture * (0.84 + 0.2 * clouds(rng, size, 0.3)[..., None]), 0, 1)
-
-
-PICTURES: tuple[Callable[[np.random.Generator, int], Float64Array], ...] = (hills, sea, circles, blocks, strokes, flower)

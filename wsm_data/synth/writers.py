@@ -64,7 +64,7 @@ def _trajectory_members(recording: SceneRecording, names: list[str], config: Syn
     """Layout 3: a folder per episode, with a cloud of its own that shows the path too."""
     for number, (name, episode) in enumerate(zip(names, recording.episodes, strict=True)):
         yield f"{name}/{_DATA}/episode_000000.parquet", episode_table(episode, recording.intrinsics, 0, config.matrices)
-        cloud = with_path(recording.cloud, episode.T_world_opengl[:, :3, 3])
+        cloud = with_path(recording.cloud, episode.T_world_camera[:, :3, 3])
         yield f"{name}/{_DATA}/path.ply", ply_bytes(cloud)
         for file, content in meta_files([len(episode.T_world_opengl)], recording.intrinsics).items():
             yield f"{name}/{file}", content

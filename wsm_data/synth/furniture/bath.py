@@ -78,7 +78,9 @@ def _mixer(style: Style) -> list[Surface]:
 def towel_rail(style: Style) -> Piece:
     """A heated rail with a towel over it, flat on the wall."""
     parts = [tube((s * 0.22, 0.05, 0.7), (s * 0.22, 0.05, 1.6), 0.012, style.metal, 6) for s in (-1, 1)]
-    parts += [tube((-0.22, 0.05, float(z)), (0.22, 0.05, float(z)), 0.009, style.metal, 6) for z in np.linspace(0.75, 1.55, 8)]
+    parts += [
+        tube((-0.22, 0.05, float(z)), (0.22, 0.05, float(z)), 0.009, style.metal, 6) for z in np.linspace(0.75, 1.55, 8)
+    ]
     towel = Material(texture=Texture.FABRIC, tint=style.accents[2].tint, repeat_m=0.3)
     parts.append(cushion((0, 0.06, 1.15), (0.36, 0.07, 0.62), towel, 0.3))
     return piece(parts, 0.5, 0.1, 1.6)

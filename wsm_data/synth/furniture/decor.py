@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from wsm_data.synth.furniture.piece import Lamp, Piece, Rectangle, piece
+from wsm_data.synth.furniture.piece import Lamp, Piece, piece
 from wsm_data.synth.solids import block, cushion, lathe, sheet, tube
 from wsm_data.synth.style import Style
-from wsm_data.synth.surface import Colour, Material, Surface, Texture, join, panel, parallelogram, placed
+from wsm_data.synth.surface import Colour, Material, Surface, Texture, join, parallelogram, placed
 
 WARM: Colour = (1.0, 0.82, 0.6)
 _PICTURES = tuple(texture for texture in Texture if texture.name.startswith("PICTURE"))
@@ -79,7 +79,7 @@ def _leaf(
     """One leaf from the soil: the later ones stand steeper and reach higher."""
     reach = (0.42 - 0.3 * lift) * height_m * float(rng.uniform(0.85, 1.15))
     top = start_m + (0.35 + 0.45 * lift) * height_m * float(rng.uniform(0.85, 1.1))
-    width = 0.075 * height_m + 0.015
+    width = 0.07 * height_m + 0.004
 
     def shape(s: "np.ndarray", t: "np.ndarray") -> tuple["np.ndarray", "np.ndarray", "np.ndarray"]:
         outline = np.sin(np.pi * np.clip(t, 0.02, 1.0) ** 0.8) * (1 - 0.3 * t) + 0.03
@@ -134,7 +134,11 @@ def books_standing(rng: np.random.Generator, style: Style, width_m: float, room_
             continue
         thick = float(rng.uniform(0.018, 0.05))
         tall, deep = room_m * float(rng.uniform(0.62, 0.93)), depth_m * float(rng.uniform(0.7, 0.95))
-        base = style.accents[int(rng.integers(5))].tint if rng.random() < 0.7 else style.scheme.strong[int(rng.integers(4))]
+        base = (
+            style.accents[int(rng.integers(5))].tint
+            if rng.random() < 0.7
+            else style.scheme.strong[int(rng.integers(4))]
+        )
         tone = float(rng.uniform(0.65, 1.05))
         cover = Material(texture=Texture.BOOK, tint=(base[0] * tone, base[1] * tone, base[2] * tone), repeat_m=0.3)
         parts.append(block((x + thick / 2, -deep / 2), 0.0, (thick, deep, tall), cover, skip=("-z", "-y"), fit=("+y",)))
@@ -149,7 +153,9 @@ def laptop(style: Style) -> Piece:
         block((0, 0), 0.0, (0.34, 0.24, 0.018), style.metal),
         block((0, -0.13), 0.018, (0.34, 0.012, 0.22), style.metal, skip=("+y",)),
         parallelogram((0.17, -0.124, 0.018), (-0.34, 0, 0), (0, 0, 0.22), screen, fit=True),
-        placed(lathe([(0.04, 0.0), (0.04, 0.09)], Material(tint=style.accents[3].tint, two_sided=True), 10), (0.3, 0, 0)),
+        placed(
+            lathe([(0.04, 0.0), (0.04, 0.09)], Material(tint=style.accents[3].tint, two_sided=True), 10), (0.3, 0, 0)
+        ),
     ]
     return Piece(surface=join(parts), footprints=(), height_m=0.24)
 
@@ -196,7 +202,10 @@ def curtains(style: Style, width_m: float, z0_m: float, z1_m: float, cloth: Mate
     parts = [tube((-reach, 0.09, z1_m), (reach, 0.09, z1_m), 0.012, style.dark, 6)]
     parts += [cushion((sign * reach, 0.09, z1_m), (0.05, 0.05, 0.05), style.dark, 1.0, 4, 6) for sign in (-1, 1)]
     for sign in (-1, 1):
-        def shape(s: "np.ndarray", t: "np.ndarray", sign: int = sign) -> tuple["np.ndarray", "np.ndarray", "np.ndarray"]:
+
+        def shape(
+            s: "np.ndarray", t: "np.ndarray", sign: int = sign
+        ) -> tuple["np.ndarray", "np.ndarray", "np.ndarray"]:
             x = sign * (reach - 0.02 - 0.34 * s * (1 - 0.12 * np.sin(np.pi * t)))
             return -x, 0.09 + 0.035 * np.sin(s * 5 * 2 * np.pi), z0_m + (z1_m - z0_m) * t
 
@@ -212,15 +221,3 @@ def basket(rng: np.random.Generator) -> Piece:
     parts = [lathe([(0.16, 0.0), (0.2, 0.5 * tall), (0.18, tall)], weave, 16)]
     parts.append(lathe([(0.18, 0.7 * tall), (0.0, 0.7 * tall)], inside, 12))
     return piece([placed(join(parts), (0.0, 0.22, 0.0))], 0.42, 0.44, tall)
-
-
-def bounds(rectangles: tuple[Rectangle, ...]) -> Rectangle:
-    """The smallest rectangle around several."""
-    r = np.array(rectangles)
-    return float(r[:, 0].min()), float(r[:, 1].min()), float(r[:, 2].max()), float(r[:, 3].max())
-
-
-def doormat() -> Surface:
-    """A mat, its middle at the origin."""
-    bristle = Material(texture=Texture.CARPET, tint=(0.5, 0.42, 0.34), repeat_m=0.3)
-    return panel((-0.4, -0.25, 0.006), (0.8, 0.0, 0.0), (0.0, 0.5, 0.0), bristle)

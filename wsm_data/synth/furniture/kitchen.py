@@ -14,31 +14,35 @@ _DEPTH_M = 0.6
 _WORKTOP_M = 0.9
 
 
-def kitchen_run(rng: np.random.Generator, style: Style, length_m: float, fridge: bool) -> Piece:
-    """Base units with sink and stove, units above them, and perhaps a refrigerator at the end."""
-    front = style.white if rng.random() < 0.4 else Material(texture=Texture.PLASTER, tint=style.scheme.strong[int(rng.integers(4))])
+def kitchen_run(rng: np.random.Generator, style: Style, length_m: float, high: bool) -> Piece:
+    """Base units with sink and stove; when `high`, with units above them and a refrigerator at the end."""
+    strong = Material(texture=Texture.PLASTER, tint=style.scheme.strong[int(rng.integers(4))])
+    front = style.white if rng.random() < 0.4 else strong
     x0 = -length_m / 2
     parts: list[Surface] = []
-    if fridge:
+    if high:
         parts += _fridge(x0 + 0.32)
         x0 += 0.66
     count = max(2, int((length_m / 2 - x0) / 0.58))
     unit = (length_m / 2 - x0) / count
-    stove, sink = int(rng.integers(count)), int(rng.integers(count))
+    stove, sink = (int(i) for i in rng.choice(count, 2, replace=False))
     for i in range(count):
         x = x0 + unit * (i + 0.5)
         parts += _base_unit(x, unit, front, style, oven=i == stove)
         if i == stove:
-            parts += _hob(x, style) + _hood(x, style)
-            continue
-        parts += _wall_unit(x, unit, front, style)
-        if i == sink:
+            parts += _hob(x, style)
+        elif i == sink:
             parts += _tap(x, style)
+        if high:
+            parts += _hood(x, style) if i == stove else _wall_unit(x, unit, front, style)
     middle, span = x0 + unit * count / 2, unit * count
+    tiles = Material(texture=Texture.WALL_TILES, repeat_m=0.8)
     parts.append(block((middle, _DEPTH_M / 2 + 0.01), _WORKTOP_M - 0.04, (span, _DEPTH_M + 0.03, 0.04), style.stone))
-    parts.append(block((middle, 0.006), _WORKTOP_M, (span, 0.012, 0.5), Material(texture=Texture.WALL_TILES, repeat_m=0.8), skip=("-y",)))
-    body = piece(parts, length_m, _DEPTH_M + 0.03, 2.1)
-    return group([body, move(bowl(style.accents[1]), (middle + 0.3 * span, 0.3), 0.0, _WORKTOP_M)])
+    parts.append(block((middle, 0.006), _WORKTOP_M, (span, 0.012, 0.5 if high else 0.15), tiles, skip=("-y",)))
+    body = piece(parts, length_m, _DEPTH_M + 0.03, 2.1 if high else 1.05)
+    free = next(i for i in (count - 1, 0, 1) if i != stove)
+    fruit = move(bowl(style.accents[1]), (x0 + unit * (free + 0.5), 0.2), 0.0, _WORKTOP_M)
+    return group([body, fruit])
 
 
 def _base_unit(x: float, width: float, front: Material, style: Style, oven: bool) -> list[Surface]:
@@ -48,7 +52,15 @@ def _base_unit(x: float, width: float, front: Material, style: Style, oven: bool
     if oven:
         parts.append(block((x, face + 0.01), 0.2, (width - 0.03, 0.02, 0.6), style.metal))
         parts.append(block((x, face + 0.022), 0.3, (width - 0.14, 0.006, 0.28), _DARK))
-        parts.append(tube((x - width / 2 + 0.08, face + 0.05, 0.68), (x + width / 2 - 0.08, face + 0.05, 0.68), 0.01, style.metal, 6))
+        parts.append(
+            tube(
+                (x - width / 2 + 0.08, face + 0.05, 0.68),
+                (x + width / 2 - 0.08, face + 0.05, 0.68),
+                0.01,
+                style.metal,
+                6,
+            )
+        )
         return parts
     for z0, z1 in ((0.12, 0.68), (0.69, 0.85)):
         parts.append(block((x, face + 0.009), z0, (width - 0.012, 0.018, z1 - z0), front, skip=("-y",)))
@@ -81,7 +93,9 @@ def _hood(x: float, style: Style) -> list[Surface]:
 
 def _tap(x: float, style: Style) -> list[Surface]:
     basin = block((x, 0.32), _WORKTOP_M, (0.46, 0.36, 0.004), style.metal)
-    inner = block((x, 0.32), _WORKTOP_M + 0.002, (0.4, 0.3, 0.004), Material(texture=Texture.METAL, tint=(0.45, 0.46, 0.47)))
+    inner = block(
+        (x, 0.32), _WORKTOP_M + 0.002, (0.4, 0.3, 0.004), Material(texture=Texture.METAL, tint=(0.45, 0.46, 0.47))
+    )
     parts = [basin, inner, tube((x, 0.1, _WORKTOP_M), (x, 0.1, _WORKTOP_M + 0.28), 0.014, style.metal)]
     parts.append(tube((x, 0.1, _WORKTOP_M + 0.28), (x, 0.26, _WORKTOP_M + 0.26), 0.012, style.metal))
     return parts

@@ -15,8 +15,10 @@ def sofa(rng: np.random.Generator, style: Style, width_m: float, cloth: Material
     parts.append(cushion((0, 0.13, 0.48), (width_m - 0.1, 0.26, 0.72), cloth, 0.2))
     for sign in (-1, 1):
         parts.append(cushion((sign * (width_m - arm) / 2, depth / 2, 0.37), (arm, depth, 0.52), cloth, 0.25))
-        parts += [tube((sign * (width_m / 2 - 0.12), y, 0), (sign * (width_m / 2 - 0.12), y, 0.13), 0.022, style.dark)
-                  for y in (0.1, depth - 0.12)]
+        parts += [
+            tube((sign * (width_m / 2 - 0.12), y, 0), (sign * (width_m / 2 - 0.12), y, 0.13), 0.022, style.dark)
+            for y in (0.1, depth - 0.12)
+        ]
     inner = width_m - 2 * arm
     for i in range(seats):
         x = -inner / 2 + inner * (i + 0.5) / seats

@@ -62,10 +62,14 @@ def chest(rng: np.random.Generator, style: Style, width_m: float, height_m: floa
     wood = style.wood if rng.random() < 0.6 else style.dark
     parts = [block((0, depth / 2), 0.14, (width_m, depth, height_m - 0.14), wood)]
     for sx in (-1, 1):
-        parts += [tube((sx * (width_m / 2 - 0.07), y, 0), (sx * (width_m / 2 - 0.09), y, 0.15), 0.02, style.dark, 6)
-                  for y in (0.07, depth - 0.07)]
+        parts += [
+            tube((sx * (width_m / 2 - 0.07), y, 0), (sx * (width_m / 2 - 0.09), y, 0.15), 0.02, style.dark, 6)
+            for y in (0.07, depth - 0.07)
+        ]
     rows = max(1, round((height_m - 0.2) / 0.2))
-    parts += _fronts(width_m - 0.03, depth, 0.16, height_m - 0.03, max(1, round(width_m / 0.6)), rows, wood, style.metal)
+    parts += _fronts(
+        width_m - 0.03, depth, 0.16, height_m - 0.03, max(1, round(width_m / 0.6)), rows, wood, style.metal
+    )
     body = piece(parts, width_m, depth + 0.04, height_m)
     thing = vase(rng, style.accents[int(rng.integers(5))])
     return group([body, move(thing, (float(rng.uniform(-0.3, 0.3)) * width_m, depth / 2), 0.0, height_m)])
@@ -76,7 +80,9 @@ def television(rng: np.random.Generator, style: Style) -> Piece:
     width, depth, height = float(rng.uniform(1.4, 1.8)), 0.42, float(rng.uniform(0.42, 0.52))
     parts = [block((0, depth / 2), 0.12, (width, depth, height - 0.12), style.wood)]
     for sx in (-1, 1):
-        parts += [block((sx * (width / 2 - 0.08), y), 0.0, (0.04, 0.04, 0.12), style.dark) for y in (0.08, depth - 0.08)]
+        parts += [
+            block((sx * (width / 2 - 0.08), y), 0.0, (0.04, 0.04, 0.12), style.dark) for y in (0.08, depth - 0.08)
+        ]
     parts += _fronts(width - 0.02, depth, 0.13, height - 0.02, 3, 1, style.wood, style.metal)
     screen = Material(texture=Texture.SCREEN, emission=0.35, tint=(1.2, 1.2, 1.2))
     black = Material(tint=(0.08, 0.08, 0.09))

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from wsm_data.synth.furniture.decor import bowl, books_lying, laptop, table_lamp, vase
+from wsm_data.synth.furniture.decor import books_lying, bowl, laptop, table_lamp, vase
 from wsm_data.synth.furniture.piece import Piece, group, move, piece
 from wsm_data.synth.furniture.seating import chair, office_chair
 from wsm_data.synth.solids import block, lathe, tube
@@ -21,7 +21,9 @@ def table(size_m: tuple[float, float, float], top: Material, legs: Material, leg
     for y in (inset, depth - inset):
         parts.append(block((0, y), height - 0.1, (width - 2 * inset, 0.025, 0.065), legs))
     for sx in (-1, 1):
-        parts.append(block((sx * (width / 2 - inset), depth / 2), height - 0.1, (0.025, depth - 2 * inset, 0.065), legs))
+        parts.append(
+            block((sx * (width / 2 - inset), depth / 2), height - 0.1, (0.025, depth - 2 * inset, 0.065), legs)
+        )
     return piece(parts, width, depth, height)
 
 
@@ -30,7 +32,15 @@ def round_table(radius_m: float, height_m: float, top: Material, foot: Material)
     r, h = radius_m, height_m
     plate = [(0.0, h - 0.035), (r, h - 0.035), (r, h - 0.035), (r, h), (r, h), (0.0, h)]
     base = 0.5 * r
-    column = [(base, 0.0), (base, 0.03), (0.7 * base, 0.05), (0.05, 0.12), (0.035, 0.35 * h), (0.05, 0.6 * h), (0.04, h - 0.05)]
+    column = [
+        (base, 0.0),
+        (base, 0.03),
+        (0.7 * base, 0.05),
+        (0.05, 0.12),
+        (0.035, 0.35 * h),
+        (0.05, 0.6 * h),
+        (0.04, h - 0.05),
+    ]
     parts = [placed(lathe(plate, top, 24), (0, r, 0)), placed(lathe([*column, (0.12, h - 0.035)], foot, 16), (0, r, 0))]
     return piece(parts, 2 * r, 2 * r, h)
 
@@ -77,7 +87,9 @@ def coffee_table(rng: np.random.Generator, style: Style) -> Piece:
         return group([base, *things])
     width, depth = float(rng.uniform(0.9, 1.2)), 0.58
     items = [table((width, depth, height), style.wood, style.dark, 0.05)]
-    items.append(piece([block((0, depth / 2), 0.12, (width - 0.12, depth - 0.12, 0.02), style.wood)], width, depth, 0.2))
+    items.append(
+        piece([block((0, depth / 2), 0.12, (width - 0.12, depth - 0.12, 0.02), style.wood)], width, depth, 0.2)
+    )
     items.append(move(books_lying(rng, style), (-width / 4, depth / 2), 0.3, height))
     items.append(move(bowl(style.accents[int(rng.integers(5))]), (width / 5, depth / 2), 0.0, height))
     return group(items)
