@@ -3,11 +3,11 @@
 A path runs from cell centre to cell centre along straight lines of sight (strict supercover, `sight.py`): the shortest
 one is what is stored, not a walk of eight-neighbour steps (4.8 % too long) and not a solution of the eikonal equation
 (0.4 %). A taut path turns only where it bends around a convex corner of the blocked area, so Dijkstra's algorithm runs
-over the cells at such corners alone. Each of them, when it is final, sweeps the wedge behind its corner, which its
+over the cells near such corners alone. Each of them, when it is final, sweeps the wedge behind its corner, which its
 predecessor could not see (`sight.sweep_octant`), and lowers all distances there in one pass.
 
-On a lattice the best turn may lie one cell further from the corner than the cells at it; what that leaves is measured
-by bench/geodesic.py against the graph of all mutually visible cells.
+Against the graph of all mutually visible cells bench/geodesic.py measures what the two settings below leave: no
+distance comes out too short, and the mean error is a few parts in ten thousand at most.
 """
 
 import heapq
@@ -24,7 +24,12 @@ from wsm_data.schema.arrays import BoolArray, Float32Array, Float64Array, requir
 from wsm_data.schema.occupancy import FREE, OccupancyGrid
 
 _TURN_CELLS = 2
+"""Paths may turn in the cells this near to a corner. Centres lie on a lattice, so the best turn need not touch the
+corner: 1 errs by up to 1 %, 2 by 0.2 %, 3 by 0.1 % at twice the time."""
+
 _SLACK_CELLS = 0.3
+"""See `sight.sweep_octant`; 0.05 errs by up to 1 %, from 0.3 on nothing changes but the time."""
+
 _GOAL, _NO_PARENT = -1, -2
 _REACH_PER_RADIUS = math.sqrt(2)
 """A free cell in a right-angled corner of walls is up to sqrt(2) radii away from the nearest traversable one."""
@@ -94,8 +99,8 @@ def geodesic_field(
     x, y = goal_column_row[0] + 0.5, goal_column_row[1] + 0.5
     if not (0 <= x < columns and 0 <= y < rows) or blocked[int(y), int(x)]:
         return np.full(traversable.shape, np.inf, np.float32)
-    opaque = np.pad(~traversable, 1, constant_values=True)
-    walls = np.pad(blocked, 1, constant_values=True)
+    opaque = np.pad(np.ascontiguousarray(~traversable), 1, constant_values=True)
+    walls = np.pad(np.ascontiguousarray(blocked), 1, constant_values=True)
     distance = _solve(opaque, walls, x + 1, y + 1, reach_m / resolution_m)
     distance = fill_bands(opaque, walls, distance, x + 1, y + 1, reach_m / resolution_m)
     return np.maximum(distance[1:-1, 1:-1] * resolution_m - goal_radius_m, 0.0).astype(np.float32)
@@ -221,7 +226,11 @@ def _solve(opaque: BoolArray, walls: BoolArray, x: float, y: float, reach: float
     else:
         distance[int(y), int(x)] = math.sqrt((int(x) + 0.5 - x) ** 2 + (int(y) + 0.5 - y) ** 2)
         _sweep_wedge(shape, flat, flat_turns, flat_distance, parent, queue, cones, (x, y, 0.0), _GOAL, everywhere)
-    while len(queue) > 0:
+    while True:
+        if len(queue) == 0:
+            _queue_overlooked(opaque, distance, queue)
+        if len(queue) == 0:
+            return distance
         value, cell = heapq.heappop(queue)
         if done[cell] or value > flat_distance[cell]:
             continue
@@ -238,4 +247,21 @@ def _solve(opaque: BoolArray, walls: BoolArray, x: float, y: float, reach: float
             if ex != 0.0:
                 wedge = (side, dx, dy, ex, ey)
                 _sweep_wedge(shape, flat, flat_turns, flat_distance, parent, queue, cones, source, cell, wedge)
-    return distance
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _queue_overlooked(opaque: BoolArray, distance: Float64Array, queue: list[tuple[float, int]]) -> None:
+    """Queue traversable cells without a distance that lie beside one with it.
+
+    Dropping rays that look useless may, in a view one cell wide, leave cells behind; connected cells are reached still.
+    """
+    rows, columns = opaque.shape
+    for row in range(1, rows - 1):
+        for column in range(1, columns - 1):
+            if opaque[row, column] or distance[row, column] < np.inf:
+                continue
+            beside = min(distance[row, column - 1], distance[row, column + 1])
+            best = min(beside, distance[row - 1, column], distance[row + 1, column]) + 1.0
+            if best < np.inf:
+                distance[row, column] = best
+                heapq.heappush(queue, (best, row * columns + column))
