@@ -8,12 +8,13 @@ from pipelines.clip_config import ClipConfig
 from pipelines.gate import require_kept
 from wsm_data.checks.expert_path import check_expert_path
 from wsm_data.checks.reachability import check_goal_reachable
+from wsm_data.errors import DataError, Reason
 from wsm_data.maps.crop import crop_around, free_swept_cells
 from wsm_data.maps.footprint import clearance_m
 from wsm_data.maps.geodesic import geodesic_distance
 from wsm_data.maps.occupancy import occupancy_for
 from wsm_data.maps.progress import sample_distance
-from wsm_data.maps.scene_map import SceneMap
+from wsm_data.maps.scene_map import MAX_MAP_CELLS, SceneMap
 from wsm_data.schema.arrays import Float32Array, Float64Array
 from wsm_data.schema.dataset import DatasetManifest
 from wsm_data.schema.episode import EpisodeRecord
@@ -44,11 +45,11 @@ def view_scene(record: EpisodeRecord, scene_map: SceneMap, dataset: DatasetManif
     leaves out.
 
     Raises:
-        DataError: the path leads through an obstacle, or the goal cannot be reached.
+        DataError: the path leads through an obstacle or far away from the map, or the goal cannot be reached.
     """
     path_xy_m, radius_m = record.path_xy_m, dataset.robot.radius_m
     floor = occupancy_for(scene_map, record.floor_z_m, record.camera_height_m, dataset.robot)
-    floor = crop_around(floor, np.concatenate([_corners_xy_m(floor), path_xy_m]), config.map_margin_m)
+    floor = _around_path(floor, path_xy_m, config.map_margin_m, record.id.text)
     floor, freed = free_swept_cells(floor, path_xy_m, radius_m)
     require_kept(check_expert_path(clearance_m(floor, path_xy_m), record.id.text))
     geodesic_m = geodesic_distance(floor, path_xy_m[-1], radius_m, config.goal_radius_m)
@@ -63,6 +64,25 @@ def view_scene(record: EpisodeRecord, scene_map: SceneMap, dataset: DatasetManif
         distance_m=distance_m,
         freed_cells=freed,
     )
+
+
+def _around_path(floor: OccupancyGrid, path_xy_m: Float64Array, margin_m: float, where: str) -> OccupancyGrid:
+    """The whole floor, and where it does not reach as far as the path and its margin, unknown cells.
+
+    Raises:
+        DataError: `map.too_large`: the path lies so far from the map that they cannot belong together.
+    """
+    points_xy_m = np.concatenate([_corners_xy_m(floor), path_xy_m]) if floor.cells.size else path_xy_m
+    columns, rows = (np.ptp(points_xy_m, axis=0) + 2 * margin_m) / floor.resolution_m
+    if columns * rows > MAX_MAP_CELLS:
+        raise DataError(
+            Reason.MAP_TOO_LARGE,
+            f"{where}: map and path must fit into {MAX_MAP_CELLS} cells, found {columns:.0f} x {rows:.0f} "
+            f"({columns * floor.resolution_m:.0f} m x {rows * floor.resolution_m:.0f} m); are the poses in metres, and "
+            "of this scene?",
+            {"columns": columns, "rows": rows, "path_low_m": path_xy_m.min(axis=0)},
+        )
+    return crop_around(floor, points_xy_m, margin_m)
 
 
 def _corners_xy_m(grid: OccupancyGrid) -> Float64Array:

@@ -15,7 +15,7 @@ NAMES = [
     for episode in range(50)
 ]
 SIGMAS = 4
-"""A fair deal of independent names lies farther off once in 16,000 deals; the names are fixed, so it lies where it lies."""
+"""A fair deal of independent names lies farther off once in 16,000 times; names and seeds here never change."""
 
 FRACTIONS = st.floats(0, 1, exclude_max=True)
 SEEDS = st.integers(0, 1 << 32)
