@@ -37,4 +37,5 @@ def calls(tmp_path):
 def fakes_on_path():
     """Environment of a subprocess that can import the fake stages."""
 
-    return {**os.environ, "PYTHONPATH": str(FAKES)}
+    path = [str(FAKES), os.environ.get("PYTHONPATH", "")]
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, path))}

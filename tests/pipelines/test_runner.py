@@ -176,6 +176,15 @@ def test_ten_first_and_now_all_share_a_folder(config, out, calls):
     assert pending(out) == []
 
 
+def test_a_unit_that_came_and_was_not_asked_for_is_pending(config, out, calls):
+    run_stage(COPY, config, out, ANY)
+    calls()
+    (config.source / "c1.txt").touch()
+    run_stage(COPY, config, out, replace(ANY, only=("a*",)))
+    assert calls() == ["finish"]
+    assert pending(out) == ["c1"]
+
+
 def test_only_takes_patterns_of_unit_ids(config, out):
     assert run_stage(COPY, config, out, replace(ANY, only=("b*", "a1"))).ran == ("a1", "b1")
 
@@ -340,6 +349,18 @@ def list_after_join(config):
     return []
 
 
+def test_a_stage_is_finished_again_when_its_input_moved_on_though_no_unit_changed(config, out, joined):
+    finished = []
+    counting = replace(JOIN, finish=lambda *_: finished.append(1) or ())
+    run_stage(counting, JoinConfig(copy=out), joined, ANY)
+    (config.source / "c1.txt").write_text("bad")
+    run_stage(COPY, config, out, ANY)
+    assert finished == []
+    assert run_stage(counting, JoinConfig(copy=out), joined, ANY).ran == ()
+    assert finished == [1]
+    assert read_stage_record(joined).seen == {"copy": read_stage_record(out).finished}
+
+
 def test_an_upstream_stage_that_was_cut_short_is_refused(config, out):
     (config.source / "a2.txt").write_text("bug")
     with pytest.raises(ValueError, match="a bug in a2"):
@@ -439,9 +460,10 @@ def test_after_the_budget_no_worker_is_left_although_the_error_is_held(config, o
 
     for name in ("a1", "a2", "b1"):
         (config.source / f"{name}.txt").write_text("bad")
-    with pytest.raises(BudgetExceeded):
+    with pytest.raises(BudgetExceeded) as held:
         run_stage(COPY, config, out, replace(ANY, max_refused=0, workers=2))
     assert multiprocessing.active_children() == []
+    assert held.tb is not None
 
 
 def test_a_folder_that_another_run_writes_is_refused(config, out):
