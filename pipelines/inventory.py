@@ -7,6 +7,7 @@ from pathlib import Path
 from pipelines.episode_table import read_episodes
 from pipelines.folder import refusal_json
 from pipelines.upstream import pending_units, quarantine_of
+from wsm_data.errors import Reason
 from wsm_data.schema.verdict import Refusal
 from wsm_data.shards.inventory import InventoryRow, UnitState
 
@@ -55,13 +56,17 @@ def account_of(index: Path, encode: Path, splits: Mapping[str, str], clips: Mapp
 
 
 def _distinct(refusals: Collection[Refusal], accepted: Collection[str]) -> list[Refusal]:
-    """Name a refused trajectory with its container where the same id was accepted, or refused, from another one."""
+    """Name a refused trajectory with its container where the same id was accepted, or refused, from another one.
+
+    A duplicate keeps the id: its reason says that it is one more of that name.
+    """
     taken = set(accepted)
     named = []
     for refusal in sorted(refusals, key=lambda one: (one.unit, one.source)):
-        unit = refusal.unit if refusal.unit not in taken else f"{refusal.unit}@{refusal.source}"
-        taken.add(unit)
-        named.append(replace(refusal, unit=unit))
+        if refusal.reason is not Reason.EPISODE_DUPLICATE and refusal.unit in taken:
+            refusal = replace(refusal, unit=f"{refusal.unit}@{refusal.source}")
+        taken.add(refusal.unit)
+        named.append(refusal)
     return named
 
 
