@@ -73,7 +73,7 @@ class SynthConfig:
     planning_margin_m: float = 0.05
     ground_clearance_m: float = 0.15
     head_room_m: float = 0.05
-    comfortable_clearance_m: float = 0.7
+    comfortable_clearance_m: float = 0.6
     floor_spacing_m: float = 0.02
     surface_spacing_m: float = 0.04
     obstacle_slice_m: tuple[float, float] = (0.15, 0.4)

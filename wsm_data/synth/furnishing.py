@@ -23,11 +23,12 @@ def furnish_room(rng: np.random.Generator, room: Room, plan: FloorPlan, style: S
         room: the room.
         plan: the storey it is part of.
         style: materials of the home.
-        fullness: 1 for as much as looks natural, less to leave more floor free.
+        fullness: 1 for as much as looks natural, less to leave more floor free, 0 for doors, lamps and pictures alone.
     """
     layout = start_layout(room, plan)
     _hang_doors(rng, layout, plan, style)
-    _FURNISH[room.kind](rng, layout, style, fullness)
+    if fullness > 0:
+        _FURNISH[room.kind](rng, layout, style, fullness)
     _finish(rng, layout, plan, style, fullness)
     return layout.pieces
 

@@ -90,14 +90,10 @@ def _furnish(rng: np.random.Generator, plan: FloorPlan, style: Style) -> list[Pi
     """Furnish every room so that each can be entered; a room that is too full is done again with less in it."""
     streams = rng.spawn(len(plan.rooms))
     rooms: list[list[Piece]] = [furnish_room(streams[i], room, plan, style, 1.0) for i, room in enumerate(plan.rooms)]
-    for fullness in (0.8, 0.6, 0.4):
+    for fullness in (0.8, 0.6, 0.4, 0.0):
         blocked = _blocked_rooms(plan, [item for pieces in rooms for item in pieces])
-        if not blocked:
-            break
         for i in blocked:
             rooms[i] = furnish_room(streams[i], plan.rooms[i], plan, style, fullness)
-    for i in _blocked_rooms(plan, [item for pieces in rooms for item in pieces]):
-        rooms[i] = [item for item in rooms[i] if not item.footprints or item.height_m >= 2.0]
     return [item for pieces in rooms for item in pieces]
 
 

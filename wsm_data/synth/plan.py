@@ -183,8 +183,7 @@ def _passages(rng: np.random.Generator, rooms: Sequence[Room]) -> list[Opening]:
                 continue
             width = float(rng.uniform(1.1, 1.5)) if sociable else 0.9
             start = low + float(rng.uniform(0.25, 0.75)) * (high - low - width)
-            kind = "passage" if sociable else "door"
-            found.append(Opening(kind=kind, axis=1, start=start, end=start + width, low=a.x1, high=b.x0))
+            found.append(Opening(kind="passage", axis=1, start=start, end=start + width, low=a.x1, high=b.x0))
     return found
 
 

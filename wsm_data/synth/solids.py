@@ -98,7 +98,7 @@ def tube(start_m: Point, end_m: Point, radius_m: float, material: Material, side
 
 
 def cushion(
-    centre_m: Point, size_m: Point, material: Material, squareness: float = 0.35, rings: int = 7, sides: int = 14
+    centre_m: Point, size_m: Point, material: Material, squareness: float = 0.35, rings: int = 6, sides: int = 12
 ) -> Surface:
     """A rounded body that fills a box: a superellipsoid (Barr 1981); squareness 1 is an ellipsoid, towards 0 a box."""
     latitude = np.linspace(-np.pi / 2, np.pi / 2, rings + 1)[None, :]
