@@ -1,7 +1,10 @@
 """Named arrays in one file, and the digest of their content."""
 
 import hashlib
+import io
+import struct
 import zipfile
+import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -10,6 +13,17 @@ import numpy as np
 from wsm_data.errors import IntegrityError
 from wsm_data.files.atomic import atomic_file
 from wsm_data.files.jsonlines import canonical_json
+
+_DAMAGED = (
+    EOFError,
+    KeyError,
+    RuntimeError,  # a flag that says "encrypted", and NotImplementedError: an unknown compression
+    ValueError,
+    struct.error,
+    zipfile.BadZipFile,
+    zlib.error,
+)
+"""What zipfile and numpy raise on changed or missing bytes, found by changing bytes one after another."""
 
 
 def save_arrays(path: Path, arrays: Mapping[str, np.ndarray]) -> None:
@@ -24,15 +38,12 @@ def load_arrays(path: Path, names: Sequence[str]) -> dict[str, np.ndarray]:
     Raises:
         IntegrityError: the file is not a whole .npz, or holds other names than `names`.
     """
+    data = io.BytesIO(path.read_bytes())  # so that an OSError means the disk, not an offset that damage made up
     try:
-        with np.load(path, allow_pickle=False) as stored:
+        with np.lib.npyio.NpzFile(data, allow_pickle=False) as stored:
             found = {name: stored[name] for name in stored.files}
-    except (zipfile.BadZipFile, ValueError, EOFError, OSError) as error:
-        if isinstance(error, FileNotFoundError):
-            raise
-        raise IntegrityError(
-            f"{path} is not a readable .npz file ({error}); delete it and run the stage again"
-        ) from error
+    except _DAMAGED as error:
+        raise IntegrityError(f"{path} is no whole .npz file ({error}); delete it and run the stage again") from error
     if sorted(found) != sorted(names):
         raise IntegrityError(f"{path} must hold the arrays {sorted(names)}, found {sorted(found)}; is it another file?")
     return found
