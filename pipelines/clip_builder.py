@@ -73,7 +73,7 @@ def read_videos(
     size = config.width, config.height
     rgb = rgb_video(frames.rgb, *size, where, length)
     depth, valid = depth_video(frames.depth, dataset.depth, config.depth_range, *size, where, length)
-    require_kept(check_depth_measured(valid, where))
+    require_kept(check_depth_measured(valid[: record.frame_count], where))
     return ClipVideos(rgb=rgb, depth=depth, depth_valid=valid)
 
 
