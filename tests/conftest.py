@@ -1,6 +1,99 @@
-"""Settings of every property test: the same examples everywhere, and no time limits for a busy machine to break."""
+"""For all tests: the same property-test examples everywhere; a small synthetic source, and the pipeline over it."""
 
+import hashlib
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import pytest
 from hypothesis import settings
 
-settings.register_profile("wsm", deadline=None, derandomize=True)
+from pipelines.recipe import Recipe, stage_config
+from pipelines.registry import load_stage
+from pipelines.report import StageReport
+from pipelines.runner import RunOptions, run_stage
+from wsm_data.synth.config import SynthConfig
+from wsm_data.synth.writers import write_scene
+
+settings.register_profile("wsm", deadline=None, derandomize=True)  # a busy machine breaks no time limit
 settings.load_profile("wsm")
+
+SMALL_CLIP = {"width": 96, "height": 64}
+STAGES = ("index", "split", "map", "encode", "pack")
+
+RunPipeline = Callable[..., dict[str, StageReport]]
+
+
+def small_synth(**changes: object) -> SynthConfig:
+    """Settings of a source that is generated in a few seconds: small images, short trajectories, wide steps."""
+    small: dict[str, object] = {
+        "scenes": 1,
+        "trajectories": 2,
+        "image_scale": 0.25,
+        "min_frames": 10,
+        "max_frames": 40,
+        "min_step_m": 0.1,
+        "max_step_m": 0.3,
+    }
+    return SynthConfig(**{**small, **changes})  # type: ignore[arg-type]
+
+
+@pytest.fixture(scope="session")
+def make_source(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+    """Generates a source tree once per set of settings."""
+    made: dict[SynthConfig, Path] = {}
+
+    def make(**changes: object) -> Path:
+        config = small_synth(**changes)
+        if config not in made:
+            out = tmp_path_factory.mktemp("source")
+            for scene in range(config.scenes):
+                for camera in config.cameras:
+                    write_scene(out, scene, camera, config)
+            made[config] = out
+        return made[config]
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def run_pipeline() -> RunPipeline:
+    """Runs the stages up to the release; returns their reports by name."""
+
+    def run(
+        source: Path,
+        out: Path,
+        *,
+        settings: Mapping[str, Mapping[str, object]] | None = None,
+        workers: int = 1,
+        stages: tuple[str, ...] = STAGES,
+        max_refused: float = 0.9,
+    ) -> dict[str, StageReport]:
+        base: dict[str, dict[str, object]] = {
+            "index": {"dataset": "synthetic", "depth_sample_every": 2},
+            "split": {"test_fraction": 0.3},
+            "encode": {"clip": dict(SMALL_CLIP), "quality_share": 0.5},
+            "pack": {"shard_mib": 1},
+        }
+        for name, changes in (settings or {}).items():
+            base[name] = {**base.get(name, {}), **changes}
+        recipe = Recipe(stages=stages, settings=base, source=str(source))
+        options = RunOptions(workers=workers, max_refused=max_refused, quiet=True)
+        return {
+            name: run_stage(load_stage(name), stage_config(recipe, name, out), out / name, options) for name in stages
+        }
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def file_digests() -> Callable[[Path], dict[str, str]]:
+    """sha256 of every file below a folder, by relative name."""
+
+    def digests(folder: Path) -> dict[str, str]:
+        return {
+            str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest()
+            for path in sorted(folder.rglob("*"))
+            if path.is_file()
+        }
+
+    return digests
