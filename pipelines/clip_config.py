@@ -1,8 +1,15 @@
 """What a clip holds."""
 
+import math
 from dataclasses import dataclass, field
 
+from wsm_data.codecs.base import SIDE_MULTIPLE_PX, TEMPORAL_RATIO
 from wsm_data.schema.depth import DepthRange
+from wsm_data.schema.surface import CELL_SIZE_M
+
+MIN_GOAL_RADIUS_M = math.sqrt(2) * CELL_SIZE_M
+"""The expert's distance is sampled between the four cell centres around it. With a goal region that holds them wherever
+in the cell the expert stops, its last distance is zero, as a release promises."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,3 +31,18 @@ class ClipConfig:
     still_frames: int = 16
     goal_radius_m: float = 0.2
     map_margin_m: float = 2.0
+
+    def __post_init__(self) -> None:
+        if min(self.width, self.height) <= 0 or self.width % SIDE_MULTIPLE_PX or self.height % SIDE_MULTIPLE_PX:
+            raise ValueError(
+                f"width and height must be multiples of {SIDE_MULTIPLE_PX} px, found {self.width} and {self.height}"
+            )
+        if self.still_frames < 0 or self.still_frames % TEMPORAL_RATIO:
+            raise ValueError(f"still_frames must be a multiple of {TEMPORAL_RATIO}, found {self.still_frames}")
+        if self.goal_radius_m < MIN_GOAL_RADIUS_M:
+            raise ValueError(
+                f"goal_radius_m must be at least {MIN_GOAL_RADIUS_M:.3f} m, the diagonal of a map cell, found "
+                f"{self.goal_radius_m}"
+            )
+        if self.map_margin_m < 0:
+            raise ValueError(f"map_margin_m must not be negative, found {self.map_margin_m}")
