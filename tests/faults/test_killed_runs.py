@@ -83,11 +83,7 @@ def run_and_die(config, out, at):
 
 
 @pytest.fixture
-def config(tmp_path):
-    source = tmp_path / "source"
-    source.mkdir()
-    for name in ("a1", "a2", "b1"):
-        (source / f"{name}.txt").write_text(f"text of {name}")
+def config(source):
     return CopyConfig(source=source)
 
 
@@ -157,10 +153,9 @@ def lines_in(path):
 
 
 @pytest.mark.parametrize("workers", [1, 2])
-def test_killed_again_and_again_at_random_moments_a_run_still_ends_as_undisturbed(tmp_path, fakes_on_path, workers):
-    source, out, undisturbed = tmp_path / "source", tmp_path / "out", tmp_path / "undisturbed"
-    source.mkdir()
-    for number in range(16):
+def test_killed_at_random_moments_a_run_still_ends_as_undisturbed(tmp_path, source, fakes_on_path, workers):
+    out, undisturbed = tmp_path / "out", tmp_path / "undisturbed"
+    for number in range(13):  # and the three of the fixture
         (source / f"u{number:02d}.txt").write_text(f"text {number}")
     program = tmp_path / "program.py"
     program.write_text(PROGRAM)
@@ -180,4 +175,6 @@ def test_killed_again_and_again_at_random_moments_a_run_still_ends_as_undisturbe
         name: whole[name] for name in whole if name != "stage.json"
     }
     assert resumed["stage.json"]["finished"] == whole["stage.json"]["finished"]
-    assert len({line["unit"] for line in resumed["ledger.jsonl"]}) == len(resumed["ledger.jsonl"]) == 16
+    assert (
+        len({line["unit"] for line in resumed["ledger.jsonl"]}) == len(resumed["ledger.jsonl"]) == 16
+    )  # and the three of the fixture
