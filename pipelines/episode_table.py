@@ -1,6 +1,6 @@
 """The table of trajectories that `wsm index` leaves and every later stage starts from."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,7 @@ class EpisodeRow:
         digest: content digest, the same in every layout.
         frames: T, raw frames.
         floor_z_m: height of its floor in the world, m.
+        notes: reason codes of what was accepted but is worth knowing; they may change while the content does not.
     """
 
     id: EpisodeId
@@ -29,6 +30,7 @@ class EpisodeRow:
     digest: str
     frames: int
     floor_z_m: float
+    notes: tuple[str, ...] = ()
 
 
 def write_episodes(folder: Path, rows: Iterable[EpisodeRow]) -> None:
@@ -45,8 +47,9 @@ def read_episodes(folder: Path) -> list[EpisodeRow]:
     """
     if not (folder / EPISODES_FILE).exists():
         raise IntegrityError(f"{folder / EPISODES_FILE} is missing; run `wsm index` again")
-    return [_row(line) for line in read_lines(folder / EPISODES_FILE)]
+    return [row_from_json(line) for line in read_lines(folder / EPISODES_FILE)]
 
 
-def _row(line: dict[str, Any]) -> EpisodeRow:
-    return EpisodeRow(**{**line, "id": EpisodeId.parse(line["id"])})
+def row_from_json(line: Mapping[str, Any]) -> EpisodeRow:
+    """A row from the JSON object that stands for it in the table and among the facts of its container."""
+    return EpisodeRow(**{**line, "id": EpisodeId.parse(line["id"]), "notes": tuple(line["notes"])})

@@ -49,6 +49,10 @@ class EncodeConfig:
     codec: CodecConfig = field(default_factory=CodecConfig)
     quality_share: float = 0.05
 
+    def __post_init__(self) -> None:
+        if not 0 <= self.quality_share <= 1:
+            raise ValueError(f"quality_share must lie in [0, 1], found {self.quality_share}")
+
 
 @dataclass(frozen=True, kw_only=True)
 class _SceneInput:

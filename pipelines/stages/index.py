@@ -10,7 +10,7 @@ from wsm_data.maps.voxels import save_voxels, voxels_digest, voxels_from_cloud, 
 
 from pipelines.config import INPUT
 from pipelines.depth_fusion import fused_points
-from pipelines.episode_table import EpisodeRow, write_episodes
+from pipelines.episode_table import row_from_json, write_episodes
 from pipelines.folder import refusal_json
 from pipelines.layout import records_path, surface_path
 from pipelines.source import container_json, conventions_digest
@@ -23,7 +23,6 @@ from wsm_data.readers.record_table import write_records
 from wsm_data.readers.scan import ContainerScan, scan_container
 from wsm_data.schema.dataset import DatasetManifest
 from wsm_data.schema.episode import EpisodeRecord
-from wsm_data.schema.identity import EpisodeId
 from wsm_data.schema.verdict import Refusal
 
 
@@ -40,6 +39,10 @@ class IndexConfig:
     source: Path = field(metadata=INPUT)
     dataset: str = "interndata_n1"
     depth_sample_every: int = 10
+
+    def __post_init__(self) -> None:
+        if self.depth_sample_every < 1:
+            raise ValueError(f"depth_sample_every must be at least 1, found {self.depth_sample_every}")
 
 
 def _list_units(config: IndexConfig) -> Sequence[Unit]:
@@ -83,12 +86,11 @@ def _index_container(
         "surface": surface,
         "cloud_refusal": cloud_refusal and refusal_json(cloud_refusal),
         "bytes": scan.bytes_read,
-        "notes": {record.id.text: list(record.notes) for record in kept if record.notes},
     }
     outputs = [records, *([surface_path(out, container.id)] if surface else [])]
     return Outcome(
         unit=unit.id,
-        digest=digest_json([sha256_file(records), surface, facts["cloud_refusal"]]),
+        digest=digest_json([sha256_file(records), surface, facts["cloud_refusal"], unit.inputs["dataset"]]),
         outputs=tuple(str(path.relative_to(out)) for path in outputs),
         facts=facts,
         refusals=tuple(refusals),
@@ -140,6 +142,7 @@ def _row(record: EpisodeRecord) -> dict[str, Any]:
         "digest": record.content_digest,
         "frames": record.frame_count,
         "floor_z_m": record.floor_z_m,
+        "notes": list(record.notes),
     }
 
 
@@ -153,7 +156,7 @@ def _finish(config: IndexConfig, context: StageContext, settled: Settled) -> Seq
             kept = first.setdefault(row["id"], row)
             if kept is not row:
                 refusals.append(_duplicate(container, row, kept))
-    write_episodes(context.out, [EpisodeRow(**{**row, "id": EpisodeId.parse(row["id"])}) for row in first.values()])
+    write_episodes(context.out, [row_from_json(row) for row in first.values()])
     return refusals
 
 

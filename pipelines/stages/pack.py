@@ -52,6 +52,10 @@ class PackConfig:
     seed: int = 0
     partial: bool = field(default=False, metadata={"role": "selection"})
 
+    def __post_init__(self) -> None:
+        if self.shard_mib < 1:
+            raise ValueError(f"shard_mib must be at least 1, found {self.shard_mib}")
+
 
 def _list_units(config: PackConfig) -> Sequence[Unit]:
     for name in ("index", "split", "map", "encode"):
