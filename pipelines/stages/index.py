@@ -5,9 +5,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from wsm_data.checks.record import check_record
-from wsm_data.maps.voxels import save_voxels, voxels_digest, voxels_from_cloud, voxels_from_depth
-
 from pipelines.config import INPUT
 from pipelines.depth_fusion import fused_points
 from pipelines.episode_table import row_from_json, write_episodes
@@ -15,8 +12,10 @@ from pipelines.folder import refusal_json
 from pipelines.layout import records_path, surface_path
 from pipelines.source import container_json, conventions_digest
 from pipelines.stage import DONE, Outcome, Settled, Stage, StageContext, Unit, refused
+from wsm_data.checks.record import check_record
 from wsm_data.errors import DataError, Reason
 from wsm_data.files.digest import digest_json, sha256_file
+from wsm_data.maps.voxels import save_voxels, voxels_digest, voxels_from_cloud, voxels_from_depth
 from wsm_data.readers.containers import Container, find_containers
 from wsm_data.readers.manifest import load_dataset
 from wsm_data.readers.record_table import write_records

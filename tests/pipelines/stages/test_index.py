@@ -52,7 +52,7 @@ def test_a_changed_convention_is_a_changed_input_of_every_container(make_pipelin
     head = [one for one in MANIFEST_TOML.splitlines() if one.split(" = ")[0] != line.split(" = ")[0]]
     text = "\n".join(head)
     pipeline.set_manifest(f"{text}\n{line}\n" if line.startswith("[") else f"{line}\n{text}\n")
-    assert changed(before, pipeline.inputs("index")) == dict.fromkeys((DEN, HALL_SCENE, ZED), {"dataset"})
+    assert changed(before, pipeline.inputs("index")) == {key: {"dataset"} for key in (DEN, HALL_SCENE, ZED)}
 
 
 def test_where_the_source_lies_is_no_setting():
