@@ -28,7 +28,7 @@ from wsm_data.readers.record_table import read_records
 from wsm_data.schema.arrays import Float32Array
 from wsm_data.schema.episode import EpisodeRecord
 from wsm_data.schema.verdict import Refusal
-from wsm_data.shards.fragment import build_fragment, write_fragment
+from wsm_data.shards.fragment import SIDECAR_SUFFIX, Fragment, build_fragment, write_fragment
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,7 +93,13 @@ def _list_units(config: EncodeConfig) -> Sequence[Unit]:
             map_digest = level_digest(mapped, row.floor_z_m)
         else:
             continue  # its map is pending, and so is the trajectory
-        inputs = {"trajectory": row.digest, "map": map_digest, "codec": codec, "dataset": conventions}
+        inputs = {
+            "trajectory": row.digest,
+            "notes": ",".join(row.notes),  # a clip holds them, and they are no part of a trajectory's content
+            "map": map_digest,
+            "codec": codec,
+            "dataset": conventions,
+        }
         units.append(Unit(id=row.id.text, source=row.container, inputs=inputs, batch=row.container, payload=scene))
     return units
 
@@ -164,22 +170,28 @@ def _encode(
             codec_digest=info.digest,
         )
         clip = build_clip(one.record, one.view, one.videos, pair, provenance, config.clip)
-        fragment = build_fragment(clip)
-        path = write_fragment(clips_folder(out), fragment)
-        quality = _quality(one, pair, codec, config)
-        facts: dict[str, Any] = {
-            "frames": one.record.frame_count,
-            "bytes": fragment.info.size_bytes,
-            "source_digest": one.record.content_digest,
-            "quality": quality,
-        }
-        outputs = (path, path.with_suffix(".json"))
-        yield Outcome(
-            unit=one.unit.id,
-            digest=fragment.info.digest,
-            outputs=tuple(str(each.relative_to(out)) for each in outputs),
-            facts=facts,
-        )
+        try:
+            fragment = build_fragment(clip)
+        except DataError as error:  # a name that cannot be stored is no fault of the others in the batch
+            yield refused(one.unit, error)
+            continue
+        yield _written(one, fragment, _quality(one, pair, codec, config), out)
+
+
+def _written(one: _Prepared, fragment: Fragment, quality: dict[str, Any] | None, out: Path) -> Outcome:
+    path = write_fragment(clips_folder(out), fragment)
+    facts: dict[str, Any] = {
+        "frames": one.record.frame_count,
+        "bytes": fragment.info.size_bytes,
+        "source_digest": one.record.content_digest,
+        "quality": quality,
+    }
+    return Outcome(
+        unit=one.unit.id,
+        digest=fragment.info.digest,
+        outputs=tuple(str(each.relative_to(out)) for each in (path, path.with_suffix(SIDECAR_SUFFIX))),
+        facts=facts,
+    )
 
 
 def _quality(

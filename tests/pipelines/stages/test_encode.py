@@ -1,0 +1,384 @@
+import json
+import shutil
+from dataclasses import asdict, replace
+
+import numpy as np
+import pytest
+from box_room import (
+    DEPTH,
+    MANIFEST_TOML,
+    RGB,
+    UPSTAIRS,
+    Drive,
+    along_x,
+    lengths_bytes,
+    moved,
+    scene_files,
+    write_archive,
+)
+
+from pipelines.clip_config import ClipConfig
+from pipelines.config import build_config
+from pipelines.folder import read_stage_record
+from pipelines.layout import clips_folder, codec_path
+from pipelines.stages import encode
+from wsm_data.codecs.dct import DctCodec
+from wsm_data.codecs.quality import CodecQuality
+from wsm_data.codecs.registry import CodecConfig
+from wsm_data.errors import ConfigError, IntegrityError
+from wsm_data.files.digest import sha256_file, xxh3_128
+from wsm_data.files.jsonlines import read_lines
+from wsm_data.schema.identity import EpisodeId
+from wsm_data.shards.fragment import fragment_path, read_fragment_info
+
+DEN, HALL, ZED = "box_d435i/den", "box_d435i/hall", "box_zed/hall"
+UNITS = [f"{DEN}/000000", f"{HALL}/000000", f"{HALL}/000001", f"{HALL}/000002", f"{ZED}/000000"]
+
+
+@pytest.fixture
+def mapped(make_pipeline):
+    pipeline = make_pipeline()
+    pipeline.run_to("map")
+    return pipeline
+
+
+def frame(pipeline, scene, number, kind=RGB, episode=0):
+    ending = "jpg" if kind == RGB else "png"
+    return pipeline.source / scene / kind / f"episode_{episode:06d}_{number:03d}.{ending}"
+
+
+def keep_cloud(pipeline, scene, drives):
+    """Write drives into a scene without touching its cloud."""
+    cloud = (pipeline.source / scene / "meta/pointcloud.ply").read_bytes()
+    pipeline.write(scene, drives)
+    (pipeline.source / scene / "meta/pointcloud.ply").write_bytes(cloud)
+
+
+def again(pipeline):
+    """Run what comes before encode again."""
+    for stage in ("index", "split", "map"):
+        pipeline.run(stage)
+
+
+def clip_digests(pipeline):
+    folder = clips_folder(pipeline.folder("encode"))
+    return {str(path.relative_to(folder)): sha256_file(path) for path in sorted(folder.rglob("*")) if path.is_file()}
+
+
+# units
+
+
+def test_every_accepted_trajectory_is_a_unit_and_those_of_a_container_share_a_pass(mapped):
+    units = mapped.units("encode")
+    assert list(units) == UNITS
+    assert {(unit.batch, unit.source) for unit in units.values()} == {(one, one) for one in (DEN, HALL, ZED)}
+    assert set(units[UNITS[0]].inputs) == {"trajectory", "notes", "map", "codec", "dataset"}
+
+
+def test_a_changed_image_changes_its_own_trajectory_alone(mapped, changed):
+    before = mapped.inputs("encode")
+    frame(mapped, HALL, 3, episode=1).write_bytes(frame(mapped, HALL, 4, episode=1).read_bytes())
+    again(mapped)
+    assert changed(before, mapped.inputs("encode")) == {f"{HALL}/000001": {"trajectory"}}
+
+
+def test_a_trajectory_on_another_floor_changes_nothing_here(mapped, changed):
+    before = mapped.inputs("encode")
+    keep_cloud(mapped, ZED, {1: along_x(room=UPSTAIRS)})
+    again(mapped)
+    assert mapped.outcomes("map")[ZED].facts["floors"] == 2
+    assert list(changed(before, mapped.inputs("encode"))) == [f"{ZED}/000001"]
+
+
+def test_another_trajectory_on_this_floor_changes_nothing_here_where_there_is_a_cloud(mapped, changed):
+    before = mapped.inputs("encode")
+    keep_cloud(mapped, HALL, {3: along_x(y_m=1.0)})
+    again(mapped)
+    assert list(changed(before, mapped.inputs("encode"))) == [f"{HALL}/000003"]
+
+
+def test_another_trajectory_changes_the_map_of_the_others_where_depth_is_fused(mapped, changed):
+    before = mapped.inputs("encode")
+    mapped.write(DEN, {1: along_x(y_m=1.6)}, cloud=False)
+    again(mapped)
+    found = changed(before, mapped.inputs("encode"))
+    assert list(found) == [f"{DEN}/000000", f"{DEN}/000001"]
+    assert found[f"{DEN}/000000"] == {"map"}
+
+
+def test_furniture_that_is_moved_upstairs_changes_what_is_upstairs(mapped, changed):
+    before = mapped.inputs("encode")
+    cloud = mapped.source / HALL / "meta/pointcloud.ply"
+    data = bytearray(cloud.read_bytes())
+    data[-15:-3] = np.array([3.0, 1.0, 3.3], "<f4").tobytes()  # the last point is one of a wall upstairs
+    cloud.write_bytes(data)
+    again(mapped)
+    assert changed(before, mapped.inputs("encode")) == {f"{HALL}/000002": {"map"}}
+
+
+def test_another_codec_changes_every_trajectory(mapped, changed, monkeypatch):
+    before = mapped.inputs("encode")
+
+    class Other(DctCodec):
+        def describe(self):
+            return replace(super().describe(), digest="other")
+
+    monkeypatch.setattr(encode, "make_codec", lambda config: Other())
+    assert changed(before, mapped.inputs("encode")) == {unit: {"codec"} for unit in UNITS}
+
+
+def test_a_changed_convention_changes_every_trajectory(mapped, changed):
+    before = mapped.inputs("encode")
+    mapped.set_manifest('homepage = "elsewhere"\n' + MANIFEST_TOML)
+    again(mapped)
+    assert changed(before, mapped.inputs("encode")) == {unit: {"dataset"} for unit in UNITS}
+
+
+def test_a_note_that_comes_or_goes_changes_its_trajectory(mapped, changed):
+    """The clip holds the note, and neither images, poses nor map tell of it."""
+    before = mapped.inputs("encode")
+    (mapped.source / HALL / "meta/episodes.jsonl").write_bytes(lengths_bytes({0: 7, 1: 14, 2: 7}))
+    again(mapped)
+    assert changed(before, mapped.inputs("encode")) == {f"{HALL}/000001": {"notes"}}
+
+
+def test_the_layout_is_no_input_and_the_clips_are_the_same(make_pipeline, changed):
+    pipeline = make_pipeline({ZED: ({0: along_x(frames=6)}, True)})
+    pipeline.run_to("encode")
+    before, clips = pipeline.inputs("encode"), clip_digests(pipeline)
+    shutil.rmtree(pipeline.source / ZED)
+    pipeline.write(f"{ZED}.tar.gz", {0: along_x(frames=6)})
+    again(pipeline)
+    assert changed(before, pipeline.inputs("encode")) == {}
+    assert pipeline.run("encode").ran == ()
+    pipeline.run("encode", options={"fork": True}, quality_share=0.5)
+    (forked,) = [path for path in pipeline.run_folder.iterdir() if path.name.startswith("encode-")]
+    assert {name: sha256_file(clips_folder(forked) / name) for name in clips} == clips
+
+
+def test_a_trajectory_whose_map_is_pending_is_not_listed_yet(make_pipeline):
+    pipeline = make_pipeline()
+    pipeline.run("index")
+    pipeline.run("map", options={"only": (HALL,)})
+    assert list(pipeline.units("encode")) == [f"{HALL}/00000{number}" for number in range(3)]
+
+
+def test_of_a_trajectory_that_stands_twice_the_kept_one_is_the_unit(make_pipeline):
+    pipeline = make_pipeline({ZED: ({0: along_x()}, True), f"{ZED}.tar.gz": ({0: along_x(), 1: along_x()}, True)})
+    pipeline.run_to("map")
+    units = pipeline.units("encode")
+    assert {name: unit.source for name, unit in units.items()} == {
+        f"{ZED}/000000": ZED,
+        f"{ZED}/000001": f"{ZED}.tar.gz",
+    }
+
+
+@pytest.mark.parametrize("missing", ["index", "map"])
+def test_it_starts_from_finished_stages(mapped, missing):
+    shutil.rmtree(mapped.folder(missing))
+    with pytest.raises(ConfigError, match=f"run `wsm {missing}` first"):
+        mapped.run("encode")
+
+
+@pytest.mark.parametrize("share", [-0.1, 1.1])
+def test_a_share_of_clips_lies_between_none_and_all(share):
+    with pytest.raises(ConfigError, match=r"quality_share must lie in \[0, 1\]"):
+        build_config(encode.EncodeConfig, {"index": "i", "map": "m", "quality_share": share})
+
+
+# what is written
+
+
+def test_the_outputs_of_a_trajectory_are_its_clip_and_what_vouches_for_it(finished):
+    folder = finished.folder("encode")
+    for unit, outcome in finished.outcomes("encode").items():
+        path = fragment_path(clips_folder(folder), EpisodeId.parse(unit).key)
+        assert [folder / name for name in outcome.outputs] == [path, path.with_suffix(".json")]
+        info = read_fragment_info(path)
+        assert outcome.digest == info.digest == xxh3_128(path.read_bytes())
+        assert outcome.facts["bytes"] == info.size_bytes == path.stat().st_size
+        assert outcome.facts["frames"] == info.meta.frames - info.meta.padded_frames
+        assert outcome.facts["source_digest"] == info.meta.source_digest
+
+
+def test_a_clip_knows_the_map_and_the_codec_it_was_made_with(finished):
+    for name, unit in finished.units("encode").items():
+        path = fragment_path(clips_folder(finished.folder("encode")), EpisodeId.parse(name).key)
+        meta = read_fragment_info(path).meta
+        assert meta.source_digest == unit.inputs["trajectory"]
+        assert meta.map_digest == unit.inputs["map"]
+        assert meta.codec_digest == unit.inputs["codec"] == DctCodec().describe().digest
+        assert (meta.map_from, meta.notes) == (("depth", ("cloud.missing",)) if DEN in name else ("cloud", ()))
+        assert (meta.freed_cells > 0) == (DEN in name)  # nobody sees the floor it stands on
+
+
+def test_the_codec_describes_itself_beside_the_clips(finished):
+    stored = json.loads(codec_path(finished.folder("encode")).read_text())
+    assert stored == json.loads(json.dumps(asdict(DctCodec().describe())))
+
+
+def test_batches_of_clips_make_the_work_faster_and_nothing_else(mapped, changed):
+    mapped.run("encode")
+    clips, inputs = clip_digests(mapped), mapped.inputs("encode")
+    batched = {"codec": CodecConfig(batch_clips=2)}
+    assert changed(inputs, mapped.inputs("encode", **batched)) == {}
+    assert mapped.run("encode", **batched).ran == ()
+    shutil.rmtree(mapped.folder("encode"))
+    mapped.run("encode", **batched)  # three clips of the hall: a full batch, and one that is not
+    assert clip_digests(mapped) == clips
+
+
+def test_the_share_of_measured_clips_depends_on_their_ids_alone_and_grows_with_it(mapped):
+    measured = {}
+    for share in (0.0, 0.5, 1.0):
+        mapped.run("encode", quality_share=share)
+        facts = {unit: outcome.facts["quality"] for unit, outcome in mapped.outcomes("encode").items()}
+        measured[share] = {unit for unit, quality in facts.items() if quality}
+        assert all(CodecQuality.from_json(facts[unit]).clips == 1 for unit in measured[share])
+        shutil.rmtree(mapped.folder("encode"))
+    assert measured[0.0] == set() < measured[0.5] < measured[1.0] == set(UNITS)
+
+
+def test_a_touched_trajectory_is_encoded_alone(mapped):
+    mapped.run("encode")
+    before = clip_digests(mapped)
+    frame(mapped, HALL, 3, episode=1).write_bytes(frame(mapped, HALL, 4, episode=1).read_bytes())
+    again(mapped)
+    assert mapped.run("encode").ran == (f"{HALL}/000001",)
+    after = clip_digests(mapped)
+    assert {name for name in after if after[name] != before[name]} == {
+        f"{HALL}/000001{end}" for end in (".clip", ".json")
+    }
+
+
+def test_a_note_that_went_away_leaves_the_clip(mapped):
+    lengths = mapped.source / HALL / "meta/episodes.jsonl"
+    right = lengths.read_bytes()
+    lengths.write_bytes(lengths_bytes({0: 7, 1: 14, 2: 7}))
+    again(mapped)
+    mapped.run("encode")
+    path = fragment_path(clips_folder(mapped.folder("encode")), f"{HALL}/000001")
+    assert read_fragment_info(path).meta.notes == ("episode.length_mismatch",)
+    lengths.write_bytes(right)
+    again(mapped)
+    mapped.run("encode")
+    assert read_fragment_info(path).meta.notes == ()
+
+
+# refusals
+
+
+def refused_here(make_pipeline, drives, damage=lambda pipeline: None):
+    """Reasons for which the trajectories of one scene are refused at encode."""
+    pipeline = make_pipeline({HALL: (drives, True)})
+    damage(pipeline)
+    pipeline.run_to("encode")
+    return dict(pipeline.refusals("encode")), pipeline
+
+
+def damage_inside(path):
+    """Change bytes in the middle of a file, which its ends do not show."""
+    data = bytearray(path.read_bytes())
+    middle = len(data) // 2
+    data[middle : middle + 40] = b"\xff\xd9" * 20
+    path.write_bytes(bytes(data))
+
+
+def test_what_cannot_be_used_is_refused_and_the_others_of_the_scene_go_on(make_pipeline):
+    wrong_way = Drive(room=along_x().room, xy_m=along_x().xy_m, yaw_rad=along_x().yaw_rad + 1.0)
+    files = scene_files({4: wrong_way})
+
+    def damage(pipeline):
+        damage_inside(frame(pipeline, HALL, 3, RGB, episode=2))
+        damage_inside(frame(pipeline, HALL, 1, DEPTH, episode=3))
+        for name, data in files.items():  # images of another drive, one for one
+            if name.startswith("videos"):
+                (pipeline.source / HALL / name).write_bytes(data)
+
+    drives = {
+        0: along_x(),
+        1: along_x(y_m=1.48),  # 2 cm beside the pillar
+        2: along_x(y_m=0.9),
+        3: along_x(y_m=1.0),
+        4: along_x(y_m=0.7, turn_rad=0.06),
+        5: along_x(y_m=2.4),
+    }
+    reasons, pipeline = refused_here(make_pipeline, drives, damage)
+    assert reasons == {
+        f"{HALL}/000001": "path.through_obstacle",
+        f"{HALL}/000002": "frame.undecodable",
+        f"{HALL}/000003": "frame.undecodable",
+        f"{HALL}/000004": "pose.depth_disagree",
+    }
+    assert {unit for unit, outcome in pipeline.outcomes("encode").items() if outcome.state == "done"} == {
+        f"{HALL}/000000",
+        f"{HALL}/000005",
+    }
+    for line in read_lines(pipeline.folder("encode") / "quarantine.jsonl"):
+        assert line["unit"] in str(line["message"])
+        assert line["source"] == HALL
+
+
+def test_a_refused_trajectory_that_was_mended_is_encoded(make_pipeline):
+    _, pipeline = refused_here(make_pipeline, {0: along_x(y_m=1.48), 1: along_x()})
+    pipeline.write(HALL, {0: along_x()})
+    again(pipeline)
+    assert pipeline.run("encode").ran == (f"{HALL}/000000",)
+    assert pipeline.refusals("encode") == []
+
+
+def test_trajectories_of_a_scene_without_a_map_are_refused_with_its_reason(mapped, changed):
+    before = mapped.inputs("encode")
+    cloud = mapped.source / HALL / "meta/pointcloud.ply"
+    whole = cloud.read_bytes()
+    cloud.write_bytes(b"no cloud")
+    again(mapped)
+    assert changed(before, mapped.inputs("encode")) == {f"{HALL}/00000{n}": {"map"} for n in range(3)}
+    report = mapped.run("encode")
+    assert (report.done, report.refused) == (2, 3)
+    (scene,) = read_lines(mapped.folder("map") / "quarantine.jsonl")
+    for line in read_lines(mapped.folder("encode") / "quarantine.jsonl"):
+        assert (line["reason"], line["details"]) == (scene["reason"], scene["details"])
+        assert line["message"] == f"the scene of {line['unit']} has no map: {scene['message']}"
+    cloud.write_bytes(whole)
+    again(mapped)
+    assert len(mapped.run("encode").ran) == 3
+    assert mapped.refusals("encode") == []
+
+
+def test_a_name_that_cannot_be_stored_is_refused_alone(make_pipeline):
+    """Trajectory folders of one archive share a batch; the bad name stands in the middle."""
+    pipeline = make_pipeline({})
+    names = ("a_trajectory", "b" * 201, "c_trajectory")
+    files = {
+        f"{name}/{file}": data
+        for number, name in enumerate(names)
+        for file, data in scene_files({0: along_x(y_m=0.8 + 0.1 * number)}, cloud=number == 0).items()
+    }
+    write_archive(pipeline.source / f"{ZED}.tar.gz", files)
+    pipeline.run_to("encode")
+    assert pipeline.refusals("encode") == [(f"{ZED}/{names[1]}", "episode.unstorable_name")]
+    states = {unit: outcome.state for unit, outcome in pipeline.outcomes("encode").items()}
+    assert states == {f"{ZED}/{name}": "refused" if name == names[1] else "done" for name in names}
+
+
+def test_a_source_that_changed_since_it_was_indexed_stops_the_stage(mapped):
+    frame(mapped, HALL, 3, episode=1).write_bytes(frame(mapped, HALL, 4, episode=1).read_bytes())
+    with pytest.raises(IntegrityError, match=f"{HALL}/000001 have other bytes; run `wsm index` again"):
+        mapped.run("encode")
+    assert f"{HALL}/000001" not in mapped.outcomes("encode")
+    assert read_stage_record(mapped.folder("encode")).finished == ""
+
+
+def test_clips_of_another_size_are_other_settings(mapped):
+    mapped.run("encode", options={"limit": 1})
+    with pytest.raises(ConfigError, match=r"clip\.width: 64 -> 96"):
+        mapped.run("encode", clip=ClipConfig(width=96, height=32))
+
+
+def test_a_camera_of_another_height_sees_another_map(make_pipeline):
+    """The robot is as high as its camera: its map is its own, though the scene's is shared."""
+    _, pipeline = refused_here(make_pipeline, {0: along_x(), 1: moved(along_x(y_m=2.4), height_m=0.3)})
+    metas = [read_fragment_info(path).meta for path in sorted(clips_folder(pipeline.folder("encode")).rglob("*.clip"))]
+    assert [meta.camera_height_m for meta in metas] == pytest.approx([0.5, 0.3])
+    assert metas[0].map_digest == metas[1].map_digest
