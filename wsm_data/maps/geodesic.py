@@ -25,7 +25,7 @@ from wsm_data.schema.occupancy import FREE, OccupancyGrid
 
 _TURN_CELLS = 2
 """Paths may turn in the cells this near to a corner. Centres lie on a lattice, so the best turn need not touch the
-corner: 1 errs by up to 1 %, 2 by 0.2 %, 3 by 0.1 % at twice the time."""
+corner: 1 errs by up to 1.0 %, 2 by 0.4 %, 3 by 0.1 % at twice the time."""
 
 _SLACK_CELLS = 0.3
 """See `sight.sweep_octant`; 0.05 errs by up to 1 %, from 0.3 on nothing changes but the time."""
