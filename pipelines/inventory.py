@@ -38,10 +38,11 @@ def account_of(index: Path, encode: Path, splits: Mapping[str, str], clips: Mapp
         clips: content digests of the trajectories that became clips, by id.
     """
     episodes = {row.id.text: row for row in read_episodes(index)}
-    at_index = _distinct(quarantine_of(index), episodes)
+    pending = {name if name not in episodes else f"{name}@{name}": name for name in pending_units(index)}
+    at_index = _distinct(quarantine_of(index), {*episodes, *pending})
     at_encode = [refusal for refusal in quarantine_of(encode) if refusal.unit in episodes]
     refused = {refusal.unit for refusal in at_encode}
-    rows = [InventoryRow(unit=unit, container=unit, state=UnitState.PENDING) for unit in pending_units(index)]
+    rows = [InventoryRow(unit=unit, container=name, state=UnitState.PENDING) for unit, name in pending.items()]
     for name, row in episodes.items():
         if name in clips:
             state, split = UnitState.CLIP, splits[name]
@@ -55,12 +56,13 @@ def account_of(index: Path, encode: Path, splits: Mapping[str, str], clips: Mapp
     return Account(rows=tuple(rows), quarantine=tuple(quarantine))
 
 
-def _distinct(refusals: Collection[Refusal], accepted: Collection[str]) -> list[Refusal]:
-    """Name a refused trajectory with its container where the same id was accepted, or refused, from another one.
+def _distinct(refusals: Collection[Refusal], others: Collection[str]) -> list[Refusal]:
+    """Name a refused unit with its container where something else stands in the account under its id.
 
-    A duplicate keeps the id: its reason says that it is one more of that name.
+    The same trajectory may have been accepted, or refused, from another container, and a trajectory folder's own name
+    may be the id of a trajectory. A duplicate keeps the id: its reason says that it is one more of that name.
     """
-    taken = set(accepted)
+    taken = set(others)
     named = []
     for refusal in sorted(refusals, key=lambda one: (one.unit, one.source)):
         if refusal.reason is not Reason.EPISODE_DUPLICATE and refusal.unit in taken:

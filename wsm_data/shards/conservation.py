@@ -19,11 +19,11 @@ def check_conservation(
 ) -> Iterator[Finding]:
     """Find units that came out nowhere, twice, or out of nothing.
 
-    A refusal as `episode.duplicate` is of one more trajectory under an id that stands in the inventory for itself.
+    A refusal as `episode.duplicate` is of one more trajectory under an id. Another of that id stands in the inventory
+    for itself, but for two in one container, of which neither could be kept.
     """
     own = [row for row in inventory if row.reason != Reason.EPISODE_DUPLICATE]
     yield from _once(own)
-    yield from _duplicates_of_something(inventory, {row.unit for row in own})
     yield from _clips_in_their_place(index, [row for row in own if row.state == UnitState.CLIP])
     yield from _refusals_written_down(inventory, quarantine)
     yield from _nothing_pending(manifest, inventory)
@@ -52,13 +52,6 @@ def _once(own: Sequence[InventoryRow]) -> Iterator[Finding]:
         if times > 1:
             states = sorted(str(row.state) for row in own if row.unit == unit)
             yield _unit(FindingKind.UNIT_TWICE, unit, f"must stand in the inventory once, found as {', '.join(states)}")
-
-
-def _duplicates_of_something(inventory: Sequence[InventoryRow], own: set[str]) -> Iterator[Finding]:
-    for row in inventory:
-        if row.reason == Reason.EPISODE_DUPLICATE and row.unit not in own:
-            message = "was refused as a duplicate, but no other trajectory of this id is in the inventory"
-            yield _unit(FindingKind.UNIT_LOST, row.unit, message)
 
 
 def _clips_in_their_place(index: IndexTable, clips: Sequence[InventoryRow]) -> Iterator[Finding]:
