@@ -49,9 +49,10 @@ class Clearance:
 
     def at(self, xy_m: Float64Array) -> Float64Array:
         """Clearance at points [..., 2] of the world (m), bilinear between cell centres; float64 [...]."""
-        column = (np.asarray(xy_m)[..., 0] - self.origin_m[0]) / CELL_M - 0.5
-        row = (np.asarray(xy_m)[..., 1] - self.origin_m[1]) / CELL_M - 0.5
-        return np.asarray(ndimage.map_coordinates(self.distance_m, [row, column], order=1, mode="nearest"))
+        xy = np.asarray(xy_m, np.float64)
+        column, row = ((xy.reshape(-1, 2) - np.array(self.origin_m)) / CELL_M - 0.5).T
+        distance = ndimage.map_coordinates(self.distance_m, [row, column], order=1, mode="nearest")
+        return np.asarray(distance).reshape(xy.shape[:-1])
 
     def centres(self, cells: NDArray[np.int64]) -> Float64Array:
         """World positions of the centres of row-major cells [...]; float64 [..., 2]."""

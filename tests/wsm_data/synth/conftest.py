@@ -5,9 +5,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from wsm_data.synth import recording
 from wsm_data.synth.config import SynthConfig
 from wsm_data.synth.home import Home, make_home
-from wsm_data.synth.occupancy import SceneColumns, scene_columns
+from wsm_data.synth.occupancy import SceneColumns, clearance, scene_columns
 from wsm_data.synth.plan import FloorPlan, Opening, Room
 from wsm_data.synth.render import RenderMesh
 from wsm_data.synth.style import Style, choose_style
@@ -21,6 +22,26 @@ def home() -> Home:
 @pytest.fixture(scope="session")
 def columns(home: Home) -> SceneColumns:
     return scene_columns(home)
+
+
+@pytest.fixture(scope="session")
+def standpoints(home: Home, columns: SceneColumns) -> list[tuple[float, float]]:
+    """The place in each room that is farthest from everything up to 1.9 m; a camera may stand there."""
+    room_for = clearance(columns, 1.9, SynthConfig())
+    centres = room_for.centres(np.arange(room_for.distance_m.size))
+    places = []
+    for room in home.plan.rooms:
+        x, y = centres.T
+        inside = (x > room.x0) & (x < room.x1) & (y > room.y0) & (y < room.y1)
+        best = centres[np.where(inside, room_for.distance_m.ravel(), -1.0).argmax()]
+        places.append((float(best[0]), float(best[1])))
+    return places
+
+
+@pytest.fixture
+def known_home(home: Home, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lets recordings of seed 0, scene 0 use the home that was built once; that homes are the same is tested apart."""
+    monkeypatch.setattr(recording, "make_home", lambda seed, scene: {(0, 0): home}[seed, scene])
 
 
 @pytest.fixture(scope="session")

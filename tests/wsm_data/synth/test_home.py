@@ -51,7 +51,7 @@ def test_light_differs_across_a_home_and_is_neither_black_nor_burnt_out(home):
 def test_trimesh_sees_the_same_triangles_in_colour(home):
     mesh = home_trimesh(home)
     assert len(mesh.faces) == len(home.mesh.points_m)
-    assert mesh.bounds[0, 2] == pytest.approx(0.0, abs=1e-9)
+    assert -0.01 < mesh.bounds[0, 2] <= 0.0  # the rims of slanting legs dip into the floor
     assert mesh.bounds[1, 2] == pytest.approx(home.plan.ceiling_m)
     assert len(np.unique(mesh.visual.face_colors, axis=0)) > 20
 

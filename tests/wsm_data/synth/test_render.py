@@ -55,18 +55,17 @@ def test_depth_of_triangles_around_the_camera_is_that_of_ray_casting(bare_mesh, 
 
 
 @pytest.mark.parametrize(("room", "yaw"), [(1, 0.4), (2, 2.3), (5, 4.1)])
-def test_depth_in_a_home_is_that_of_ray_casting(home, room, yaw):
-    r = home.plan.rooms[room]
-    T = looking((r.x0 + r.x1) / 2, (r.y0 + r.y1) / 2, 1.93, yaw, 0.45)
+def test_depth_in_a_home_is_that_of_ray_casting(home, standpoints, room, yaw):
+    T = looking(*standpoints[room], 1.4, yaw, 0.3)
     _, depth_m = render(home.mesh, T, TINY)
     wrong = relative_error(depth_m, cast(home.mesh.points_m, T, TINY)) > 1e-6
     # a ray may graze the edge between two surfaces and be given to either
     assert wrong.mean() <= 0.005, np.argwhere(wrong)
 
 
-def test_nothing_is_seen_through_the_seams_of_a_home(home):
-    for number, room in enumerate(home.plan.rooms):
-        T = looking((room.x0 + room.x1) / 2, (room.y0 + room.y1) / 2, 1.95, 0.9 * number, 0.3)
+def test_nothing_is_seen_through_the_seams_of_a_home(home, standpoints):
+    for number, place in enumerate(standpoints):
+        T = looking(*place, 1.3, 0.9 * number, 0.2)
         assert (render(home.mesh, T, CAMERA)[1] > 0).all()
 
 
@@ -110,10 +109,9 @@ def test_a_white_surface_under_full_light_is_white_and_nothing_is_black(bare_mes
     assert (rgb_u8[depth_m == 0] == 0).all()
 
 
-def test_buffers_are_reused_and_those_of_another_size_refused(home):
+def test_buffers_are_reused_and_those_of_another_size_refused(home, standpoints):
     buffers = make_buffers(home.mesh, TINY)
-    room = home.plan.rooms[1]
-    T = looking((room.x0 + room.x1) / 2, (room.y0 + room.y1) / 2, 1.9, 1.0, 0.3)
+    T = looking(*standpoints[1], 1.2, 1.0, 0.3)
     rgb_u8, depth_m = render(home.mesh, T, TINY, buffers)
     assert rgb_u8 is buffers.rgb_u8
     fresh_rgb, fresh_depth = render(home.mesh, T, TINY)
