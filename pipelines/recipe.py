@@ -1,14 +1,14 @@
 """Recipes: a named list of stages with differences from their defaults, wired into one run folder."""
 
-import difflib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from pipelines.config import build_config, convert, load_toml, merge
+from pipelines.config import input_fields, merge
 from pipelines.registry import STAGES, load_stage
 from wsm_data.errors import ConfigError
+from wsm_data.files.typed_toml import build_config, convert, did_you_mean, load_toml
 
 _FOLDER = Path(__file__).parent / "recipes"
 _NAMES = tuple(entry.name for entry in STAGES)
@@ -66,11 +66,7 @@ def stage_sections(values: Mapping[str, Any], where: str) -> dict[str, Mapping[s
 def stage_config(recipe: Recipe, name: str, run: Path) -> Any:
     """The config of one stage of a run: every input field named after a stage is that stage's folder in the run."""
     stage = load_stage(name)
-    inputs: dict[str, Any] = {
-        one.name: str(run / one.name)
-        for one in fields(stage.config_type)
-        if one.metadata.get("role") == "input" and one.name in _NAMES
-    }
+    inputs: dict[str, Any] = {one: str(run / one) for one in input_fields(stage.config_type) if one in _NAMES}
     settings = recipe.settings.get(name, {})
     if name == "index" and "source" not in settings:
         inputs["source"] = _source(recipe, run)
@@ -98,14 +94,10 @@ def _recipe_path(name: str) -> Path:
         return path
     if Path(name).suffix == ".toml":
         return Path(name)
-    nearest = difflib.get_close_matches(name, recipe_names(), n=1)
-    hint = f"did you mean {nearest[0]}?" if nearest else f"recipes: {', '.join(recipe_names())}, or a TOML file"
-    raise ConfigError(f"there is no recipe {name!r}; {hint}")
+    raise ConfigError(f"there is no recipe {name!r}, and it is no TOML file; {did_you_mean(name, recipe_names())}")
 
 
 def _require_known(found: Iterable[str], known: Sequence[str], where: str) -> None:
     unknown = next((one for one in found if one not in known), None)
     if unknown is not None:
-        nearest = difflib.get_close_matches(unknown, known, n=1)
-        hint = f"did you mean {nearest[0]}?" if nearest else f"known: {', '.join(known)}"
-        raise ConfigError(f"{where}: {unknown!r} is not known; {hint}")
+        raise ConfigError(f"{where}: {unknown!r} is not known; {did_you_mean(unknown, known)}")

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from wsm_data.errors import ConfigError
+from wsm_data.files.typed_toml import did_you_mean
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,6 +50,7 @@ def load_stage_module(name: str) -> Any:
     Raises:
         ConfigError: there is no such stage.
     """
-    if name not in {entry.name for entry in STAGES}:
-        raise ConfigError(f"there is no stage {name!r}; stages: {', '.join(entry.name for entry in STAGES)}")
+    names = [entry.name for entry in STAGES]
+    if name not in names:
+        raise ConfigError(f"there is no stage {name!r}; {did_you_mean(name, names)}")
     return importlib.import_module(f"pipelines.stages.{name}")

@@ -1,10 +1,10 @@
 """How a stage reads the ones before it: through their records and ledgers, never by listing files."""
 
 from collections.abc import Mapping
-from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+from pipelines.config import input_fields
 from pipelines.folder import (
     PENDING_FILE,
     QUARANTINE_FILE,
@@ -21,8 +21,7 @@ from wsm_data.schema.verdict import Refusal
 
 def upstream_records(config: Any) -> dict[str, StageRecord]:
     """Records of the stages a config takes its inputs from, by the field that names the folder."""
-    names = [one.name for one in fields(config) if one.metadata.get("role") == "input"]
-    records = {name: read_stage_record(Path(getattr(config, name))) for name in names}
+    records = {name: read_stage_record(Path(getattr(config, name))) for name in input_fields(config)}
     return {name: record for name, record in records.items() if record is not None}
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import typer
 
-from pipelines.config import build_config, config_json, load_toml, merge, parse_assignments
+from pipelines.config import config_json, merge, parse_assignments
 from pipelines.engines.choice import engine
 from pipelines.folder import read_stage_record
 from pipelines.recipe import Recipe, load_recipe, stage_config, stage_sections
@@ -19,6 +19,7 @@ from pipelines.report import StageReport, summary_table
 from pipelines.runner import RunOptions, fingerprint, run_stage
 from wsm_data.errors import ConfigError
 from wsm_data.files.digest import digest_json
+from wsm_data.files.typed_toml import build_config, load_toml
 
 
 def run_one(

@@ -8,7 +8,6 @@ from typing import Any
 
 from pipelines.clip_builder import ClipVideos, Provenance, build_clip, measure_quality, read_videos
 from pipelines.clip_config import ClipConfig
-from pipelines.config import INPUT
 from pipelines.depth_gate import require_depth_agreement
 from pipelines.episode_table import read_episodes
 from pipelines.layout import clips_folder, codec_path, map_path, records_path
@@ -21,6 +20,7 @@ from wsm_data.codecs.registry import CodecConfig, make_codec
 from wsm_data.errors import DataError
 from wsm_data.files.atomic import write_text
 from wsm_data.files.digest import sha256_bytes
+from wsm_data.files.typed_toml import INPUT
 from wsm_data.maps.scene_map import SceneMap, floor_levels, load_scene_map
 from wsm_data.readers.containers import Container
 from wsm_data.readers.frames import iter_episode_frames

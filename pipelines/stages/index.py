@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from pipelines.config import INPUT
 from pipelines.depth_fusion import fused_points
 from pipelines.episode_table import row_from_json, write_episodes
 from pipelines.folder import refusal_json
@@ -15,6 +14,7 @@ from pipelines.stage import DONE, Outcome, Settled, Stage, StageContext, Unit, r
 from wsm_data.checks.record import check_record
 from wsm_data.errors import DataError, Reason
 from wsm_data.files.digest import digest_json, sha256_file
+from wsm_data.files.typed_toml import INPUT
 from wsm_data.maps.voxels import save_voxels, voxels_digest, voxels_from_cloud, voxels_from_depth
 from wsm_data.readers.containers import Container, find_containers
 from wsm_data.readers.manifest import load_dataset

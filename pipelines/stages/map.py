@@ -6,7 +6,6 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
-from pipelines.config import INPUT
 from pipelines.folder import refusal_from_json
 from pipelines.layout import map_path, surface_path
 from pipelines.source import conventions_digest, indexed_source
@@ -14,6 +13,7 @@ from pipelines.stage import Outcome, Stage, StageContext, Unit, refused
 from pipelines.upstream import done_outcomes
 from wsm_data.errors import DataError, Reason
 from wsm_data.files.digest import digest_json
+from wsm_data.files.typed_toml import INPUT
 from wsm_data.maps.scene_map import build_scene_map, floor_levels, save_scene_map, scene_map_digest
 from wsm_data.maps.voxels import load_voxels
 

@@ -6,7 +6,6 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from pipelines.config import INPUT
 from pipelines.inventory import account_of
 from pipelines.layout import clips_folder, codec_path, release_folder
 from pipelines.source import indexed_source
@@ -16,6 +15,7 @@ from pipelines.upstream import done_outcomes, pending_units, require_stage
 from wsm_data.codecs.quality import CodecQuality
 from wsm_data.errors import ConfigError
 from wsm_data.files.digest import digest_json
+from wsm_data.files.typed_toml import INPUT
 from wsm_data.schema.codec import CodecInfo
 from wsm_data.schema.depth import DepthRange
 from wsm_data.schema.identity import EpisodeId

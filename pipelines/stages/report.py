@@ -4,7 +4,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from pipelines.config import INPUT
 from pipelines.folder import read_ledger, read_stage_record
 from pipelines.registry import STAGES
 from pipelines.release_codec import codec_of
@@ -12,6 +11,7 @@ from pipelines.stage import DONE, REFUSED, Outcome, Stage, StageContext, Unit
 from pipelines.upstream import pending_units
 from wsm_data.files.digest import sha256_bytes, sha256_file
 from wsm_data.files.stores import open_store
+from wsm_data.files.typed_toml import INPUT
 from wsm_data.shards.names import MANIFEST_NAME
 from wsm_data.shards.release import open_release
 from wsm_data.view.clip_survey import SurveyConfig, survey_clips

@@ -6,11 +6,11 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from pipelines.config import INPUT
 from pipelines.stage import Outcome, Stage, StageContext, Unit
 from wsm_data.errors import IntegrityError
 from wsm_data.files.digest import digest_json, sha256_bytes
 from wsm_data.files.stores import open_store
+from wsm_data.files.typed_toml import INPUT
 from wsm_data.shards.findings import Finding
 from wsm_data.shards.names import MANIFEST_NAME
 from wsm_data.shards.release import read_manifest

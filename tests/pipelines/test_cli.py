@@ -35,7 +35,7 @@ def test_a_stage_runs_and_prints_its_table(wsm, tmp_path):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--set", "lettres=upper"), "error: unknown setting lettres; did you mean letters?\n"),
+        (("--set", "lettres=upper"), "error: unknown key lettres; did you mean letters?\n"),
         (("--set", "repeat"), "error: --set takes key=value or section.key=value, found 'repeat'\n"),
         (("--set", "letters=odd"), "error: letters must be one of as_they_are, upper, found 'odd'\n"),
         (("--config", "absent.toml"), "error: configuration file absent.toml does not exist\n"),
@@ -124,7 +124,7 @@ def test_settings_come_from_the_stages_section_of_a_file_and_set_wins(wsm, tmp_p
     [
         ("[coppy]\nrepeat = 2", "error: my.toml: 'coppy' is not known; did you mean copy?\n"),
         ("copy = 2", "error: my.toml: copy is a section of settings, found the value 2\n"),
-        ("[copy]\nrepaet = 2", "error: unknown setting repaet; did you mean repeat?\n"),
+        ("[copy]\nrepaet = 2", "error: unknown key repaet; did you mean repeat?\n"),
     ],
 )
 def test_no_key_of_a_file_is_quietly_ignored(wsm, tmp_path, text, said):

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from pipelines.clip_config import MIN_GOAL_RADIUS_M, ClipConfig
-from pipelines.config import build_config
 from wsm_data.errors import ConfigError
+from wsm_data.files.typed_toml import build_config
 from wsm_data.maps.geodesic import geodesic_distance
 from wsm_data.maps.progress import sample_distance
 from wsm_data.schema.occupancy import OccupancyGrid

@@ -63,7 +63,7 @@ def test_what_a_recipe_does_not_know_is_refused(recipe_file, text, message):
 
 
 def test_an_unknown_recipe_is_refused_with_the_nearest():
-    with pytest.raises(ConfigError, match=r"there is no recipe 'dmo'; did you mean demo\?"):
+    with pytest.raises(ConfigError, match=r"there is no recipe 'dmo', and it is no TOML file; did you mean demo\?"):
         load_recipe("dmo", None, {})
     with pytest.raises(ConfigError, match=r"configuration file mine.toml does not exist"):
         load_recipe("mine.toml", None, {})

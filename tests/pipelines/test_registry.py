@@ -11,6 +11,6 @@ def test_a_stage_is_found_under_its_name(name):
     assert load_stage(name).name == name
 
 
-def test_an_unknown_stage_is_refused_with_the_known_ones():
-    with pytest.raises(ConfigError, match="there is no stage 'encod'; stages: synth, index, split, map, encode"):
+def test_an_unknown_stage_is_refused_with_the_nearest():
+    with pytest.raises(ConfigError, match="there is no stage 'encod'; did you mean encode"):
         load_stage("encod")

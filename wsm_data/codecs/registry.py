@@ -1,12 +1,12 @@
 """The codecs by name, and the settings that choose one."""
 
-import difflib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from wsm_data.codecs.base import VideoCodec
 from wsm_data.errors import ConfigError
+from wsm_data.files.typed_toml import INPUT, SPEED, did_you_mean
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,10 +27,10 @@ class CodecConfig:
     """
 
     name: str = "dct"
-    weights: str = field(default="", metadata={"role": "input"})
+    weights: str = field(default="", metadata=INPUT)
     dtype: str = "float32"
-    device: str = field(default="auto", metadata={"role": "speed"})
-    batch_clips: int = field(default=1, metadata={"role": "speed"})
+    device: str = field(default="auto", metadata=SPEED)
+    batch_clips: int = field(default=1, metadata=SPEED)
 
     def __post_init__(self) -> None:
         if self.batch_clips < 1:
@@ -44,10 +44,7 @@ def make_codec(config: CodecConfig) -> VideoCodec:
         ConfigError: the name is unknown, a setting does not belong to the codec, or its weights cannot be used.
     """
     if config.name not in _MAKERS:
-        near = difflib.get_close_matches(config.name, _MAKERS, n=1, cutoff=0)
-        raise ConfigError(
-            f"codec.name must be one of {', '.join(_MAKERS)}, found {config.name!r}; did you mean {near[0]!r}?"
-        )
+        raise ConfigError(f"codec.name {config.name!r} is not known; {did_you_mean(config.name, _MAKERS)}")
     return _MAKERS[config.name](config)
 
 

@@ -12,12 +12,12 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from pathlib import Path
 
-from pipelines.config import INPUT, SPEED
 from pipelines.stage import Outcome, Settled, Stage, StageContext, Unit
 from pipelines.upstream import done_outcomes, require_stage
 from wsm_data.errors import DataError, Reason
 from wsm_data.files.atomic import write_bytes, write_text
 from wsm_data.files.digest import sha256_bytes
+from wsm_data.files.typed_toml import INPUT, SPEED
 from wsm_data.schema.verdict import Refusal
 
 CALLS = "calls.txt"

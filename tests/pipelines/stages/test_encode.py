@@ -18,7 +18,6 @@ from box_room import (
 )
 
 from pipelines.clip_config import ClipConfig
-from pipelines.config import build_config
 from pipelines.folder import read_stage_record
 from pipelines.layout import clips_folder, codec_path
 from pipelines.stages import encode
@@ -28,6 +27,7 @@ from wsm_data.codecs.registry import CodecConfig
 from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.files.digest import sha256_file, xxh3_128
 from wsm_data.files.jsonlines import read_lines
+from wsm_data.files.typed_toml import build_config
 from wsm_data.schema.identity import EpisodeId
 from wsm_data.shards.fragment import fragment_path, read_fragment_info
 

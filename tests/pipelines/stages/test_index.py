@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from box_room import DEPTH, HALL, MANIFEST_TOML, RGB, UPSTAIRS, along_x, cloud_points, lengths_bytes, moved, ply_bytes
 
-from pipelines.config import build_config, settings_of
+from pipelines.config import settings_of
 from pipelines.episode_table import read_episodes
 from pipelines.folder import read_stage_record
 from pipelines.layout import records_path, surface_path
@@ -14,6 +14,7 @@ from pipelines.source import container_from_json
 from pipelines.stages.index import IndexConfig
 from wsm_data.errors import ConfigError
 from wsm_data.files.jsonlines import read_lines
+from wsm_data.files.typed_toml import build_config
 from wsm_data.maps.voxels import load_voxels, voxels_digest
 from wsm_data.readers.containers import Layout
 from wsm_data.readers.record_table import read_records

@@ -1,12 +1,12 @@
 import pytest
 from box_room import along_x
 
-from pipelines.config import build_config
 from pipelines.split_table import read_split
 from pipelines.stages.split import SplitConfig
 from wsm_data.curation.split import SplitBy, leaking_scenes, split_of
 from wsm_data.errors import ConfigError
 from wsm_data.files.digest import sha256_file
+from wsm_data.files.typed_toml import build_config
 from wsm_data.schema.identity import EpisodeId
 
 ZED, D435I = "box_zed/hall", "box_d435i/hall"
