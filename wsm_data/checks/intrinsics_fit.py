@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wsm_data.checks.limits import verdict_within
 from wsm_data.errors import Reason
 from wsm_data.schema.camera import Intrinsics
 from wsm_data.schema.dataset import CameraModel
@@ -58,16 +59,7 @@ def check_intrinsics_fit(
     if published is not None and (published.width, published.height) == (intrinsics.width, intrinsics.height):
         error = _published_error(intrinsics, published)
         limits["published_error"] = (error, 0.0, config.max_published_error)
-    measured = {name: value for name, (value, _, _) in limits.items()}
-    broken = [
-        f"{name} must lie in [{low:g}, {high:g}], found {value:.4g}"
-        for name, (value, low, high) in limits.items()
-        if not low <= value <= high
-    ]
-    if not broken:
-        return Verdict(measured=measured)
-    message = f"{record.id.text}: the intrinsics do not fit: {'; '.join(broken)} ({intrinsics})"
-    return Verdict(reason=Reason.INTRINSICS_MISFIT, message=message, measured=measured)
+    return verdict_within(limits, Reason.INTRINSICS_MISFIT, f"{record.id.text}: {intrinsics} does not fit the images")
 
 
 def _centre_offset(intrinsics: Intrinsics) -> float:

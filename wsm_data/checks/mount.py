@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wsm_data.checks.limits import verdict_within
 from wsm_data.errors import Reason
 from wsm_data.schema.arrays import Float64Array
 from wsm_data.schema.dataset import DatasetManifest
@@ -39,16 +40,7 @@ def check_mount(record: EpisodeRecord, dataset: DatasetManifest, config: MountCo
         "pitch_disagreement_deg": (float(np.abs(pitch_deg - mount_pitch_deg).max()), 0.0, config.max_disagreement_deg),
         "roll_deg": (float(np.abs(roll_deg).max()), 0.0, config.max_roll_deg),
     }
-    measured = {name: value for name, (value, _, _) in limits.items()}
-    broken = [
-        f"{name} must lie in [{low:g}, {high:g}], found {value:.4g}"
-        for name, (value, low, high) in limits.items()
-        if not low <= value <= high
-    ]
-    if not broken:
-        return Verdict(measured=measured)
-    message = f"{record.id.text}: the camera does not stand as its mount says: {'; '.join(broken)}"
-    return Verdict(reason=Reason.MOUNT_MISFIT, message=message, measured=measured)
+    return verdict_within(limits, Reason.MOUNT_MISFIT, f"{record.id.text}: the camera does not stand as its mount says")
 
 
 def _pitch_and_roll_deg(T_world_camera: Float64Array) -> tuple[Float64Array, Float64Array]:
