@@ -13,7 +13,6 @@ import pyarrow.parquet as pq
 
 from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.files.atomic import atomic_file
-from wsm_data.files.stores import open_store
 from wsm_data.shards.index_row import (
     COUNT_COLUMNS,
     INDEX_VERSION,
@@ -25,7 +24,6 @@ from wsm_data.shards.index_row import (
     parse_row,
     row_record,
 )
-from wsm_data.shards.names import INDEX_NAME
 
 _ROW_GROUP_ROWS = 1 << 20
 
@@ -139,12 +137,3 @@ def parse_index(data: bytes, where: str, columns: Sequence[str] | None = None) -
     except (pa.ArrowException, OSError, ValueError) as error:
         raise IntegrityError(f"{where} must be the index of a release, but: {error}; restore the file") from error
     return IndexTable(table)
-
-
-def read_index(location: str | Path, columns: Sequence[str] | None = None) -> IndexTable:
-    """Read the index of the release at a path or URL, all of it or some columns.
-
-    Raises:
-        IntegrityError: it is not an index of this version.
-    """
-    return parse_index(open_store(location).read(INDEX_NAME), f"{location}/{INDEX_NAME}", columns)

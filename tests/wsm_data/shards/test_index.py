@@ -1,4 +1,5 @@
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -8,9 +9,13 @@ import pytest
 
 from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.schema.clip import MEMBERS
-from wsm_data.shards.index import IndexTable, index_table, parse_index, read_index, write_index
+from wsm_data.shards.index import IndexTable, index_table, parse_index, write_index
 from wsm_data.shards.index_row import SCHEMA
 from wsm_data.shards.names import INDEX_NAME
+
+
+def read_index(folder: Path, columns: Sequence[str] | None = None) -> IndexTable:
+    return parse_index((folder / INDEX_NAME).read_bytes(), "index", columns)
 
 
 @pytest.fixture
