@@ -3,6 +3,11 @@
 from pathlib import Path
 
 
+def conventions_path(index: Path) -> Path:
+    """The conventions that were applied to the source, written by `wsm index`."""
+    return index / "conventions.json"
+
+
 def records_path(index: Path, container: str) -> Path:
     """Table of the trajectories of one container, written by `wsm index`."""
     return index / "containers" / container / "records.parquet"

@@ -1,14 +1,18 @@
 """What later stages need to know of the source that `wsm index` read: where it lies and what its conventions are."""
 
+import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from pipelines.config import config_json
+from pipelines.layout import conventions_path
 from pipelines.upstream import require_stage
+from wsm_data.errors import ConfigError, IntegrityError
+from wsm_data.files.atomic import write_text
 from wsm_data.files.digest import digest_json
+from wsm_data.files.typed_toml import build_config
 from wsm_data.readers.containers import Container, Layout
-from wsm_data.readers.manifest import load_dataset
 from wsm_data.schema.dataset import DatasetManifest
 
 
@@ -26,13 +30,30 @@ class IndexedSource:
 
 
 def indexed_source(index: Path) -> IndexedSource:
-    """The source of an index folder.
+    """The source of an index folder, with the conventions that were applied to it.
+
+    Its manifest is not read again: it may have been changed since, and then says what the next `wsm index` will do.
 
     Raises:
-        ConfigError: the folder is not a finished index, or its data set manifest is gone.
+        ConfigError: the folder is not a finished index.
+        IntegrityError: the conventions are gone although the stage says that it is done, or cannot be read.
     """
     config = require_stage(index, "index").config
-    return IndexedSource(root=Path(config["source"]), dataset=load_dataset(config["dataset"]))
+    return IndexedSource(root=Path(config["source"]), dataset=_read_conventions(conventions_path(index)))
+
+
+def write_conventions(index: Path, dataset: DatasetManifest) -> None:
+    """Write down the conventions that are applied to a source."""
+    write_text(conventions_path(index), json.dumps(config_json(dataset), indent=2, sort_keys=True) + "\n")
+
+
+def _read_conventions(path: Path) -> DatasetManifest:
+    try:
+        return build_config(DatasetManifest, json.loads(path.read_text()))
+    except (OSError, ValueError, ConfigError) as error:
+        raise IntegrityError(
+            f"{path} must hold the conventions of the source ({error}); run `wsm index` again"
+        ) from error
 
 
 def conventions_digest(dataset: DatasetManifest) -> str:

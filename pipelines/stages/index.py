@@ -9,7 +9,7 @@ from pipelines.depth_fusion import fused_points
 from pipelines.episode_table import row_from_json, write_episodes
 from pipelines.folder import refusal_json
 from pipelines.layout import records_path, surface_path
-from pipelines.source import container_json, conventions_digest
+from pipelines.source import container_json, conventions_digest, write_conventions
 from pipelines.stage import DONE, Outcome, Settled, Stage, StageContext, Unit, refused
 from wsm_data.checks.record import check_record
 from wsm_data.errors import DataError, Reason
@@ -31,12 +31,13 @@ class IndexConfig:
 
     Attributes:
         source: root of the source tree: groups, with scene archives, scene folders or trajectory folders in them.
-        dataset: manifest with the source's conventions: a name under manifests/datasets/, or a TOML file.
+        dataset: manifest with the source's conventions: a name under manifests/datasets/, or a TOML file. What it says
+            is part of every unit's inputs, what it is called is not.
         depth_sample_every: where a scene has no cloud, every n-th depth frame is fused into its map.
     """
 
     source: Path = field(metadata=INPUT)
-    dataset: str = "interndata_n1"
+    dataset: str = field(default="interndata_n1", metadata=INPUT)
     depth_sample_every: int = 10
 
     def __post_init__(self) -> None:
@@ -147,7 +148,7 @@ def _row(record: EpisodeRecord) -> dict[str, Any]:
 
 def _finish(config: IndexConfig, context: StageContext, settled: Settled) -> Sequence[Refusal]:
     """Write the table of trajectories; of those found twice the first container's stays, the others are refused."""
-    del config
+    write_conventions(context.out, load_dataset(config.dataset))
     first: dict[str, Mapping[str, Any]] = {}
     refusals = []
     for container, outcome in sorted(settled.outcomes.items()):

@@ -56,8 +56,8 @@ def test_a_changed_convention_is_a_changed_input_of_every_container(make_pipelin
     assert changed(before, pipeline.inputs("index")) == {key: {"dataset"} for key in (DEN, HALL_SCENE, ZED)}
 
 
-def test_where_the_source_lies_is_no_setting():
-    assert settings_of(IndexConfig(source=Path("anywhere"))) == {"dataset": "interndata_n1", "depth_sample_every": 10}
+def test_where_the_source_and_its_manifest_lie_is_no_setting():
+    assert settings_of(IndexConfig(source=Path("anywhere"), dataset="any.toml")) == {"depth_sample_every": 10}
 
 
 @pytest.mark.parametrize("every", [0, -1])
