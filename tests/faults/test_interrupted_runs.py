@@ -5,27 +5,12 @@ import os
 from dataclasses import replace
 
 import pytest
-from fake_stages import COPY, CopyConfig
+from fake_runs import ANY, copies
+from fake_stages import COPY
 
 from pipelines.folder import locked, read_ledger, read_stage_record
-from pipelines.runner import RunOptions, run_stage
+from pipelines.runner import run_stage
 from wsm_data.errors import BudgetExceeded, ConfigError, WsmError
-
-ANY = RunOptions(quiet=True, max_refused=100)
-
-
-@pytest.fixture
-def config(source):
-    return CopyConfig(source=source)
-
-
-@pytest.fixture
-def out(tmp_path):
-    return tmp_path / "run" / "copy"
-
-
-def copies(out):
-    return {path.stem: path.read_text() for path in (out / "copies").glob("*.txt")}
 
 
 @pytest.mark.parametrize("workers", [1, 2])

@@ -83,11 +83,6 @@ def run_and_die(config, out, at):
 
 
 @pytest.fixture
-def config(source):
-    return CopyConfig(source=source)
-
-
-@pytest.fixture
 def before(config, tmp_path):
     """A finished folder; after it was written one unit changed, one left, and two came, one of them bad."""
     folder = tmp_path / "before"

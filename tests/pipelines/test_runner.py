@@ -3,28 +3,13 @@
 from dataclasses import replace
 
 import pytest
+from fake_runs import ANY, copies
 from fake_stages import COPY, COPY_VERSION_2, JOIN, CopyConfig, JoinConfig, Letters
 
 from pipelines.folder import read_ledger, read_stage_record
-from pipelines.runner import RunOptions, run_stage
+from pipelines.runner import run_stage
 from wsm_data.errors import BudgetExceeded, ConfigError, WsmError
 from wsm_data.files.jsonlines import read_lines
-
-ANY = RunOptions(quiet=True, max_refused=100)
-
-
-@pytest.fixture
-def config(source):
-    return CopyConfig(source=source)
-
-
-@pytest.fixture
-def out(tmp_path):
-    return tmp_path / "run" / "copy"
-
-
-def copies(out):
-    return {path.stem: path.read_text() for path in (out / "copies").glob("*.txt")}
 
 
 def refused_units(out):

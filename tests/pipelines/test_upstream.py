@@ -3,24 +3,13 @@
 from dataclasses import replace
 
 import pytest
-from fake_stages import COPY, JOIN, CopyConfig, JoinConfig
+from fake_runs import ANY
+from fake_stages import COPY, JOIN, JoinConfig
 
 from pipelines.folder import read_stage_record
-from pipelines.runner import RunOptions, run_stage
+from pipelines.runner import run_stage
 from pipelines.upstream import done_outcomes, pending_units, quarantine_of, require_stage, upstream_records
 from wsm_data.errors import ConfigError, Reason
-
-ANY = RunOptions(quiet=True, max_refused=100)
-
-
-@pytest.fixture
-def config(source):
-    return CopyConfig(source=source)
-
-
-@pytest.fixture
-def out(tmp_path):
-    return tmp_path / "run" / "copy"
 
 
 @pytest.fixture

@@ -1,7 +1,7 @@
 """index.parquet: one row per clip, in the order of the shards, with the place and checksum of every member."""
 
 from bisect import bisect_left
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -53,7 +53,7 @@ class IndexTable:
     """The index in memory, column by column.
 
     Attributes:
-        table: a pyarrow table with the columns of `SCHEMA`, or with those that were asked for.
+        table: a pyarrow table with the columns of `SCHEMA`.
     """
 
     table: pa.Table
@@ -115,13 +115,12 @@ class IndexTable:
         return int(order[place]) if found else None
 
 
-def parse_index(data: bytes, where: str, columns: Sequence[str] | None = None) -> IndexTable:
+def parse_index(data: bytes, where: str) -> IndexTable:
     """Read an index from the bytes of its file.
 
     Args:
         data: content of an index.parquet.
         where: its place, for messages.
-        columns: names of the columns to read; all when None.
 
     Raises:
         IntegrityError: it is not an index of this version.
@@ -131,8 +130,8 @@ def parse_index(data: bytes, where: str, columns: Sequence[str] | None = None) -
         metadata = file.schema_arrow.metadata or {}
         if metadata.get(b"wsm.index_version") != INDEX_VERSION.encode():
             raise ValueError(f"wsm.index_version must be {INDEX_VERSION}; use a matching wsm")
-        table = file.read(columns=list(columns) if columns is not None else None)
-        if columns is None and table.schema != SCHEMA:
+        table = file.read()
+        if table.schema != SCHEMA:
             raise ValueError(f"its columns must be those of docs/format.md, found {table.schema.names}")
     except (pa.ArrowException, OSError, ValueError) as error:
         raise IntegrityError(f"{where} must be the index of a release, but: {error}; restore the file") from error
