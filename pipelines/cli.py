@@ -162,8 +162,14 @@ def inspect_release(
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="Contact sheet to write; default: KEY.png here.")
     ] = None,
+    rerun: Annotated[
+        Path | None,
+        typer.Option(
+            "--rerun", help="Recording of the clip (.rrd) to write, in place of a contact sheet without --out."
+        ),
+    ] = None,
     limit: Annotated[int, typer.Option("--limit", min=0, help="Clips to list; 0: all.")] = 20,
     weights: Annotated[str, typer.Option("--weights", help="Folder of the codec's weights, where it has any.")] = "",
 ) -> None:
     """List a release, or show one clip and draw it."""
-    _load("inspect").inspect_release(release, key, out, limit, weights)
+    _load("inspect").inspect_release(release, key, out, rerun, limit, weights)

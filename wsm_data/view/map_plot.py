@@ -192,10 +192,11 @@ def _draw_cells(axes: Axes, grid: OccupancyGrid, field_m: Float64Array) -> None:
             zorder=0,
         )
     )
-    axes.imshow(_cell_picture(grid, field_m), origin="lower", extent=_extent_m(grid), interpolation="nearest", zorder=1)
+    axes.imshow(cell_picture(grid, field_m), origin="lower", extent=_extent_m(grid), interpolation="nearest", zorder=1)
 
 
-def _cell_picture(grid: OccupancyGrid, field_m: Float64Array) -> Uint8Array:
+def cell_picture(grid: OccupancyGrid, field_m: Float64Array) -> Uint8Array:
+    """Colours of the cells, uint8 RGBA [Y, X, 4], in the order of the grid; transparent where they are unknown."""
     picture = np.zeros((*grid.cells.shape, 4), np.uint8)
     free, fits = grid.cells == FREE, np.isfinite(field_m)
     for where, colour in (
