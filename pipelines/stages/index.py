@@ -1,5 +1,7 @@
 """`wsm index`: one sequential pass over every archive and folder of a source."""
 
+import logging
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -23,6 +25,8 @@ from wsm_data.readers.scan import ContainerScan, scan_container
 from wsm_data.schema.dataset import DatasetManifest
 from wsm_data.schema.episode import EpisodeRecord
 from wsm_data.schema.verdict import Refusal
+
+_LOG = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -148,7 +152,8 @@ def _row(record: EpisodeRecord) -> dict[str, Any]:
 
 def _finish(config: IndexConfig, context: StageContext, settled: Settled) -> Sequence[Refusal]:
     """Write the table of trajectories; of those found twice the first container's stays, the others are refused."""
-    write_conventions(context.out, load_dataset(config.dataset))
+    dataset = load_dataset(config.dataset)
+    write_conventions(context.out, dataset)
     first: dict[str, Mapping[str, Any]] = {}
     refusals = []
     for container, outcome in sorted(settled.outcomes.items()):
@@ -156,8 +161,31 @@ def _finish(config: IndexConfig, context: StageContext, settled: Settled) -> Seq
             kept = first.setdefault(row["id"], row)
             if kept is not row:
                 refusals.append(_duplicate(container, row, kept))
-    write_episodes(context.out, [row_from_json(row) for row in first.values()])
+    rows = [row_from_json(row) for row in first.values()]
+    write_episodes(context.out, rows)
+    if not settled.pending:
+        refused_episodes = [one.unit for outcome in settled.outcomes.values() for one in outcome.refusals]
+        found = Counter(unit.split("/")[0] for unit in (*(row.id.text for row in rows), *refused_episodes))
+        for line in count_differences(found, dataset.expected_episodes):
+            _LOG.warning("%s", line)
     return refusals
+
+
+def count_differences(found: Mapping[str, int], expected: Mapping[str, int]) -> list[str]:
+    """A line for every group of the source that does not hold as many trajectories as were published.
+
+    Groups that are not there at all are not missed: people download what they need.
+
+    Args:
+        found: trajectories and refusals by group.
+        expected: published trajectories by group.
+    """
+    return [
+        f"{group}: {expected[group]:,} trajectories were published, {count:,} are here, refused ones included; "
+        "is the download complete?"
+        for group, count in sorted(found.items())
+        if group in expected and count != expected[group]
+    ]
 
 
 def _duplicate(container: str, row: Mapping[str, Any], kept: Mapping[str, Any]) -> Refusal:

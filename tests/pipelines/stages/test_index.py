@@ -11,7 +11,7 @@ from pipelines.episode_table import read_episodes
 from pipelines.folder import read_stage_record
 from pipelines.layout import records_path, surface_path
 from pipelines.source import container_from_json
-from pipelines.stages.index import IndexConfig
+from pipelines.stages.index import IndexConfig, count_differences
 from wsm_data.errors import ConfigError
 from wsm_data.files.jsonlines import read_lines
 from wsm_data.files.typed_toml import build_config
@@ -300,3 +300,10 @@ def test_the_same_scene_gives_the_same_records_and_surface_as_folder_and_as_arch
     as_archive = pipeline.outcomes("index")[f"{ZED}.tar.gz"].facts
     assert as_archive["surface"] == as_folder["surface"]
     assert as_archive["episodes"][0]["digest"] == as_folder["episodes"][0]["digest"]
+
+
+def test_a_group_with_another_number_of_trajectories_than_published_is_told_and_an_absent_group_is_not():
+    expected = {"gibson_zed": 13_093, "replica_zed": 637, "hm3d_zed": 7_642}
+    lines = count_differences({"gibson_zed": 13_000, "replica_zed": 637, "mine": 4}, expected)
+    assert len(lines) == 1
+    assert lines[0].startswith("gibson_zed: 13,093 trajectories were published, 13,000 are here")
