@@ -19,7 +19,9 @@ NEAR_M = 0.01
 
 TEXEL_BITS = 8  # of a texture sample; its interpolation weights have 8 bits
 LIGHT_BITS = 10  # of a light sample, of which 512 stands for 1; its interpolation weights have 6 bits
-PLANES = 19  # per drawn triangle: u/z, v/z, s/z, t/z, 1/z as planes over the image, texel area, triangle, 2 limits
+LANES_OF_13 = 0x1FFF1FFF1FFF  # three channels of 13 bits in lanes of 16
+PLANES = 17  # per drawn triangle: u/z, v/z, s/z, t/z, 1/z as planes over the image, texel area, number
+SPAN = 8  # pixels over which texture and light coordinates are taken for straight
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
@@ -186,13 +188,14 @@ def draw(
             _image_bounds(v, fx, fy, cx, cy, bounds)
             if bounds[1] < 0 or bounds[0] > width - 1 or bounds[3] < 0 or bounds[2] > height - 1:
                 continue
-            for k in range(3):
-                W[k] = (E[0, k] + E[1, k] + E[2, k]) / det
-            _attribute_planes(E, W, det, uv[f], st[f], planes[count])
-            planes[count, 16] = f
             if det < 0.0:
                 E *= -1.0
+                det = -det
+            for k in range(3):
+                W[k] = (E[0, k] + E[1, k] + E[2, k]) / det
             if _fill(E, W, bounds, count, inv_z, ids):
+                _attribute_planes(E, W, det, uv[f], st[f], planes[count])
+                planes[count, 16] = f
                 count += 1
     return count
 
@@ -222,20 +225,23 @@ def _blend(samples: "np.ndarray", i00: int, i10: int, i01: int, i11: int, fs: in
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
-def _texel(texels: "np.ndarray", offsets: "np.ndarray", size_bits: int, u: float, v: float, area: float) -> int:
-    """Texture colour, 8.8 bits a channel, bilinear on the level whose texels are about as large as the pixel."""
+def _level(area: float, size_bits: int) -> int:
+    """The level of a texture whose texels are about as large as a pixel that covers `area` texels of the first."""
     level = 0
     while area > 2.0 and level < size_bits:
         area *= 0.25
-        u *= 0.5
-        v *= 0.5
         level += 1
-    mask = (1 << (size_bits - level)) - 1
-    fixed_u, fixed_v = int(u * 256.0) - 128, int(v * 256.0) - 128  # texel centres lie at halves
+    return level
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _texel(texels: "np.ndarray", offset: int, bits: int, fixed_u: int, fixed_v: int) -> int:
+    """Texture colour, 8.8 bits a channel, bilinear on a level of side 1 << bits; u and v in 1/256 of its texels."""
+    mask = (1 << bits) - 1
+    fixed_u, fixed_v = fixed_u - 128, fixed_v - 128  # texel centres lie at halves
     u0, v0 = (fixed_u >> 8) & mask, (fixed_v >> 8) & mask
     u1, v1 = (u0 + 1) & mask, (v0 + 1) & mask
-    row0 = offsets[level] + (v0 << (size_bits - level))
-    row1 = offsets[level] + (v1 << (size_bits - level))
+    row0, row1 = offset + (v0 << bits), offset + (v1 << bits)
     return _blend(texels, row0 + u0, row0 + u1, row1 + u0, row1 + u1, fixed_u & 255, fixed_v & 255, 8)
 
 
@@ -246,6 +252,12 @@ def _light(light: "np.ndarray", offset: int, columns: int, rows: int, s: float, 
     fixed_t = min(max(int(t * 64.0), 0), ((rows - 1) << 6) - 1)
     i = offset + (fixed_t >> 6) * columns + (fixed_s >> 6)
     return _blend(light, i, i + 1, i + columns, i + columns + 1, fixed_s & 63, fixed_t & 63, 6)
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _at(planes: Float64Array, row: int, k: int, x: int, y: int, z: float) -> float:
+    """Attribute number k / 3 of a drawn triangle at a pixel that sees it at depth z."""
+    return (planes[row, k] * x + planes[row, k + 1] * y + planes[row, k + 2]) * z
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
@@ -279,28 +291,45 @@ def shade(
     """
     height, width = inv_z.shape
     for y in range(height):
-        last = -1
-        p, layer, patch = planes[0], 0, light_patch[0]
-        u0 = v0 = s0 = t0 = 0.0
         for x in range(width):
-            row = ids[y, x]
+            depth_m[y, x] = 1.0 / inv_z[y, x] if inv_z[y, x] > 0.0 else 0.0
+        first = 0
+        while first < width:
+            row = ids[y, first]
+            last, limit = first, min(width, first + SPAN) - 1
+            while last < limit and ids[y, last + 1] == row:
+                last += 1
             if row < 0:
-                rgb_u8[y, x, 0] = rgb_u8[y, x, 1] = rgb_u8[y, x, 2] = 0
-                depth_m[y, x] = 0.0
+                rgb_u8[y, first : last + 1] = 0
+                first = last + 1
                 continue
-            if row != last:
-                last = row
-                p = planes[row]
-                face = int(p[16])
-                layer, patch = texture[face], light_patch[face]
-                u0, v0, s0, t0 = p[1] * y + p[2], p[4] * y + p[5], p[7] * y + p[8], p[10] * y + p[11]
-            z = 1.0 / inv_z[y, x]
-            depth_m[y, x] = z
-            area = p[15] * z * z * z
-            u, v = (p[0] * x + u0) * z, (p[3] * x + v0) * z
-            colour = _texel(texels, level_offsets[layer], size_bits[layer], u, v, area)
-            s, t = (p[6] * x + s0) * z, (p[9] * x + t0) * z
-            lit = _light(light, patch[0], patch[1], patch[2], s, t)
-            for channel in range(3):
-                product = ((colour >> (16 * channel)) & 0xFFFF) * ((lit >> (16 * channel)) & 0xFFFF)
-                rgb_u8[y, x, channel] = min(255, product >> 23)
+            # coordinates and light are exact at both ends of the span, and straight in between
+            z0, z1 = depth_m[y, first], depth_m[y, last]
+            face = int(planes[row, 16])
+            layer = texture[face]
+            level = _level(planes[row, 15] * z0 * z1 * max(z0, z1), size_bits[layer])
+            offset, bits = level_offsets[layer, level], size_bits[layer] - level
+            scale = 65536.0 / (1 << level)
+            u0 = _at(planes, row, 0, first, y, z0) * scale
+            v0 = _at(planes, row, 3, first, y, z0) * scale
+            u1 = _at(planes, row, 0, last, y, z1) * scale
+            v1 = _at(planes, row, 3, last, y, z1) * scale
+            s0, t0 = _at(planes, row, 6, first, y, z0), _at(planes, row, 9, first, y, z0)
+            s1, t1 = _at(planes, row, 6, last, y, z1), _at(planes, row, 9, last, y, z1)
+            node, columns, rows = light_patch[face, 0], light_patch[face, 1], light_patch[face, 2]
+            # three bits fewer a channel leave room for the weights, which sum to eight
+            lit0 = (_light(light, node, columns, rows, s0, t0) >> 3) & LANES_OF_13
+            lit1 = (_light(light, node, columns, rows, s1, t1) >> 3) & LANES_OF_13
+            part = 1.0 / max(1, last - first)
+            u, v, du, dv = int(u0), int(v0), int((u1 - u0) * part), int((v1 - v0) * part)
+            weight, growth = 0, int(2048.0 * part)
+            for x in range(first, last + 1):
+                colour = _texel(texels, offset, bits, u >> 8, v >> 8)
+                lit = lit0 * (8 - (weight >> 8)) + lit1 * (weight >> 8)
+                for channel in range(3):
+                    product = ((colour >> (16 * channel)) & 0xFFFF) * ((lit >> (16 * channel)) & 0xFFFF)
+                    rgb_u8[y, x, channel] = min(255, product >> 23)
+                u += du
+                v += dv
+                weight += growth
+            first = last + 1

@@ -3,7 +3,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wsm_data.synth.atlas import pack_colours
-from wsm_data.synth.rasteriser import _blend, _light, _texel
+from wsm_data.synth.rasteriser import _blend, _level, _light, _texel
 
 
 def channel(packed: int, number: int) -> int:
@@ -23,22 +23,17 @@ def test_channels_are_weighed_without_spilling_into_one_another():
     assert [channel(mixed, k) / 256 for k in range(3)] == [127.5, 63.75, 191.25]
 
 
-def two_levels() -> tuple[np.ndarray, np.ndarray]:
-    """A 2 x 2 texture of 0, 100, 200, 40 and its mean 85."""
-    texels = pack_colours(np.repeat(np.array([0, 100, 200, 40, 85])[:, None], 3, axis=1))
-    return texels, np.array([0, 4], np.int64)
-
-
 def test_a_texel_shows_its_own_colour_at_its_centre_and_repeats():
-    texels, offsets = two_levels()
+    texels = pack_colours(np.repeat(np.array([0, 100, 200, 40])[:, None], 3, axis=1))
     for u, v, value in ((0.5, 0.5, 0), (1.5, 0.5, 100), (0.5, 1.5, 200), (3.5, 3.5, 40)):
-        assert channel(_texel(texels, offsets, 1, u + 2, v + 2, 0.1), 0) == value << 8
+        assert channel(_texel(texels, 0, 1, int(256 * (u + 2)), int(256 * (v + 2))), 0) == value << 8
+    assert channel(_texel(texels, 0, 1, int(256 * 3.0), int(256 * 2.5)), 0) == 50 << 8  # half way from 0 to 100
 
 
-def test_a_pixel_that_covers_many_texels_sees_their_mean():
-    texels, offsets = two_levels()
-    assert channel(_texel(texels, offsets, 1, 2.5, 2.5, 4.0), 0) == 85 << 8
-    assert channel(_texel(texels, offsets, 1, 2.5, 2.5, 1e9), 2) == 85 << 8
+def test_the_level_has_texels_about_as_large_as_the_pixel():
+    # a pixel over A texels of level 0 covers A / 4^n of level n; that is brought to at most 2
+    assert [_level(area, 8) for area in (0.01, 1.9, 2.1, 7.9, 8.1, 130.0)] == [0, 0, 1, 1, 2, 4]
+    assert _level(1e12, 8) == 8
 
 
 def test_light_is_interpolated_between_nodes_and_held_at_the_edges():

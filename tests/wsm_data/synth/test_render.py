@@ -1,8 +1,10 @@
 import numpy as np
 import pytest
+from numba import njit
 
 from wsm_data.geometry.camera import pixel_rays
 from wsm_data.schema.camera import Intrinsics
+from wsm_data.synth import rasteriser
 from wsm_data.synth.rasteriser import NEAR_M
 from wsm_data.synth.render import make_buffers, render
 
@@ -119,3 +121,14 @@ def test_buffers_are_reused_and_those_of_another_size_refused(home, standpoints)
     assert (depth_m == fresh_depth).all()
     with pytest.raises(ValueError, match="make_buffers"):
         render(home.mesh, T, CAMERA, buffers)
+
+
+def test_texture_and_light_between_the_ends_of_a_span_are_those_of_the_pixel(home, standpoints, monkeypatch):
+    # spans of one pixel take every coordinate exactly
+    T = looking(*standpoints[3], 0.9, 2.0, 0.3)
+    fast = render(home.mesh, T, CAMERA)[0].astype(int)
+    monkeypatch.setattr(rasteriser, "SPAN", 1)
+    monkeypatch.setattr("wsm_data.synth.render.shade", njit(rasteriser.shade.py_func))
+    exact = render(home.mesh, T, CAMERA)[0].astype(int)
+    assert np.abs(fast - exact).mean() < 1.0
+    assert np.quantile(np.abs(fast - exact), 0.99) < 12
