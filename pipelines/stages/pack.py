@@ -15,7 +15,7 @@ from pipelines.upstream import done_outcomes, pending_units, require_stage
 from wsm_data.codecs.quality import CodecQuality
 from wsm_data.errors import ConfigError
 from wsm_data.files.digest import digest_json
-from wsm_data.files.typed_toml import INPUT
+from wsm_data.files.typed_toml import INPUT, SELECTION
 from wsm_data.schema.codec import CodecInfo
 from wsm_data.schema.depth import DepthRange
 from wsm_data.schema.identity import EpisodeId
@@ -50,7 +50,7 @@ class PackConfig:
     name: str = "release"
     shard_mib: int = 512
     seed: int = 0
-    partial: bool = field(default=False, metadata={"role": "selection"})
+    partial: bool = field(default=False, metadata=SELECTION)
 
     def __post_init__(self) -> None:
         if self.shard_mib < 1:

@@ -21,6 +21,9 @@ INPUT = {"role": "input"}
 SPEED = {"role": "speed"}
 """Field metadata: changes how fast the work is done, never the bytes that are written."""
 
+SELECTION = {"role": "selection"}
+"""Field metadata: allows less than the whole source, without a change to what is written of each unit."""
+
 
 class Word(str):
     """The value of a `--set` word as it was typed: what it means depends on the type of the field it is for."""
