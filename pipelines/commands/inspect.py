@@ -52,8 +52,10 @@ def _list_clips(release: Release, limit: int) -> None:
 
 
 def _key(release: Release, text: str) -> str:
-    """A clip's key, given as key or as the id of its trajectory."""
-    keys = set(release.index.texts("key"))
-    if text not in keys and text.count("/") == 2:
+    """A clip's key, given as key or as the id of its trajectory; what is neither stays as it is."""
+    if text in release.index.texts("key"):
+        return text
+    try:
         return EpisodeId.parse(text).key
-    return text
+    except ValueError:
+        return text

@@ -9,11 +9,11 @@ from pipelines.registry import STAGES
 from pipelines.release_codec import codec_of
 from pipelines.stage import DONE, REFUSED, Outcome, Stage, StageContext, Unit
 from pipelines.upstream import pending_units
-from wsm_data.files.digest import sha256_bytes, sha256_file
+from wsm_data.files.digest import digest_json, sha256_file
 from wsm_data.files.stores import open_store
 from wsm_data.files.typed_toml import INPUT
-from wsm_data.shards.names import MANIFEST_NAME
-from wsm_data.shards.release import open_release
+from wsm_data.shards.manifest import release_digest
+from wsm_data.shards.release import open_release, read_manifest
 from wsm_data.view.clip_survey import SurveyConfig, survey_clips
 from wsm_data.view.report import write_report
 from wsm_data.view.report_data import ReportData, StageSummary
@@ -39,8 +39,8 @@ class ReportConfig:
 
 
 def _list_units(config: ReportConfig) -> Sequence[Unit]:
-    manifest = open_store(config.release).read(MANIFEST_NAME)
-    return [Unit(id="report", inputs={"manifest": sha256_bytes(manifest)})]
+    digest = release_digest(read_manifest(open_store(config.release)))
+    return [Unit(id="report", inputs={"manifest": digest, "stages": _stages_digest(_run_folder(config))})]
 
 
 def _process(batch: Sequence[Unit], config: ReportConfig, context: StageContext) -> Iterator[Outcome]:
@@ -75,6 +75,12 @@ def stage_summaries(run: Path) -> tuple[StageSummary, ...]:
             )
         )
     return tuple(summaries)
+
+
+def _stages_digest(run: Path) -> str:
+    """What the stages of a run came to, without the report's own."""
+    records = [read_stage_record(run / entry.name) for entry in STAGES if entry.name != STAGE.name]
+    return digest_json([[one.name, one.fingerprint, one.finished] for one in records if one is not None])
 
 
 def _run_folder(config: ReportConfig) -> Path:

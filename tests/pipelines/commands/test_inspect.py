@@ -1,8 +1,83 @@
-from pathlib import Path
+"""`wsm inspect`: what it prints and draws of a small release."""
 
+import cv2
 import pytest
+from box_room import MANIFEST_TOML, along_x, scene_files, write_folder
 
 from pipelines.cli import app
+from pipelines.commands.inspect import inspect_release
+from pipelines.recipe import Recipe, stage_config
+from pipelines.registry import load_stage
+from pipelines.runner import RunOptions, run_stage
+from wsm_data.errors import ConfigError, IntegrityError
+
+SCENE = "box_zed/Acker.ville"
+KEYS = ["box_zed/Acker%2Eville/000000", "box_zed/Acker%2Eville/000001", "box_zed/Acker%2Eville/000002"]
+
+
+@pytest.fixture(scope="module")
+def release(tmp_path_factory):
+    """Three clips of a scene whose name has a dot, and one refusal."""
+    root = tmp_path_factory.mktemp("inspected")
+    drives = {number: along_x(y_m=0.7 + 0.1 * number, frames=5) for number in range(3)}
+    write_folder(root / "source" / SCENE, scene_files({**drives, 3: along_x(frames=4)}))
+    (root / "rooms.toml").write_text(MANIFEST_TOML)
+    settings = {
+        "index": {"dataset": str(root / "rooms.toml")},
+        "split": {"test_fraction": 0.0},
+        "encode": {"clip": {"width": 64, "height": 32}},
+    }
+    stages = ("index", "split", "map", "encode", "pack")
+    recipe = Recipe(stages=stages, settings=settings, source=str(root / "source"))
+    for name in stages:
+        config = stage_config(recipe, name, root / "run")
+        run_stage(load_stage(name), config, root / "run" / name, RunOptions(quiet=True))
+    return root / "run" / "pack" / "release"
+
+
+def inspect(release, key=None, out=None, rerun=None, limit=20, weights=""):
+    inspect_release(str(release), key, out, rerun, limit, weights)
+
+
+def test_a_release_is_listed_with_its_clips_and_what_was_dropped(release, capsys):
+    inspect(release)
+    printed = capsys.readouterr().out
+    assert "train-000000.tar" in printed
+    assert "episode.too_short" in printed
+    assert [line.strip() for line in printed.splitlines()][-3:] == KEYS
+
+
+@pytest.mark.parametrize(
+    ("limit", "shown", "rest"), [(2, 2, "and 1 more; --limit 0 lists all"), (3, 3, ""), (0, 3, "")]
+)
+def test_as_many_clips_are_listed_as_asked_for_and_the_rest_counted(release, capsys, limit, shown, rest):
+    inspect(release, limit=limit)
+    listed = capsys.readouterr().out.partition("\nclips\n")[2]
+    assert [line.strip() for line in listed.splitlines()] == [*KEYS[:shown], *([rest] if rest else [])]
+
+
+@pytest.mark.parametrize("name", [KEYS[1], f"{SCENE}/000001"])
+def test_a_clip_is_found_by_its_key_and_by_the_id_of_its_trajectory(release, capsys, tmp_path, name):
+    inspect(release, key=name, out=tmp_path / "sheet.png")
+    printed = capsys.readouterr().out
+    assert printed.startswith(KEYS[1])
+    for word in ("rgb_latent", "float16", "geodesic_mm", "provenance", "source_digest"):
+        assert word in printed
+    assert printed.splitlines()[-1] == f"contact sheet: {tmp_path / 'sheet.png'}"
+    assert cv2.imread(str(tmp_path / "sheet.png")).shape[1] == 1600
+
+
+def test_without_a_name_the_sheet_is_called_after_its_clip(release, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    inspect(release, key=KEYS[0])
+    assert [path.name for path in tmp_path.iterdir()] == ["box_zed_Acker%2Eville_000000.png"]
+
+
+@pytest.mark.parametrize("name", ["box_zed/Acker.ville/000009", "nothing", "a/b", "a//b", "a/../b", "/a/b", "a/b/c/d"])
+def test_a_clip_that_is_not_there_is_a_wrong_request(release, tmp_path, name):
+    with pytest.raises(ConfigError, match=r"the release has no clip .*`wsm inspect RELEASE` lists what it has"):
+        inspect(release, key=name, out=tmp_path / "sheet.png")
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("option", ["--out", "--rerun"])
@@ -11,4 +86,31 @@ def test_a_picture_or_a_recording_of_no_clip_is_a_wrong_request(option, tmp_path
         app(["inspect", str(tmp_path), option, str(tmp_path / "file")])
     assert stopped.value.code == 2
     assert "name it by its KEY" in capsys.readouterr().err
-    assert list(Path(tmp_path).iterdir()) == []
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("sheet", [None, "sheet.png"])
+def test_a_recording_takes_the_place_of_the_sheet_unless_both_are_asked_for(
+    release, capsys, tmp_path, monkeypatch, sheet
+):
+    monkeypatch.setattr(
+        "pipelines.commands.inspect.write_rerun", lambda clip, codec, path: path.write_bytes(b"recording")
+    )
+    monkeypatch.chdir(tmp_path)
+    inspect(release, key=KEYS[0], out=sheet and tmp_path / sheet, rerun=tmp_path / "clip.rrd")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["clip.rrd", *([sheet] if sheet else [])]
+    printed = capsys.readouterr().out
+    assert f"recording: {tmp_path / 'clip.rrd'}" in printed
+    assert ("contact sheet:" in printed) == bool(sheet)
+
+
+def test_weights_that_do_not_belong_to_the_codec_are_refused(release, tmp_path):
+    with pytest.raises(ConfigError, match="codec dct has no weights"):
+        inspect(release, key=KEYS[0], out=tmp_path / "sheet.png", weights="somewhere")
+
+
+def test_a_release_that_is_not_there_or_unfinished_is_named(release, tmp_path):
+    with pytest.raises(ConfigError, match="there is no release at"):
+        inspect(tmp_path / "absent")
+    with pytest.raises(IntegrityError, match="unfinished"):
+        inspect(release.parent)
