@@ -131,6 +131,12 @@ def test_files_are_of_a_readable_length():
     assert {path: lines for path, lines in lengths.items() if lines > MAX_FILE_LINES} == {}
 
 
+def _docstring_lines(node: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
+    first = node.body[0]
+    has_docstring = isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant)
+    return first.end_lineno - first.lineno + 1 if has_docstring else 0
+
+
 def test_functions_are_of_a_readable_length():
     functions = [
         (f"{relative(path)}:{node.lineno} {node.name}", node.end_lineno - node.lineno + 1)

@@ -149,7 +149,7 @@ def _facts(config: PackConfig, clips: Mapping[str, Outcome]) -> ReleaseFacts:
         encoded_width_px=clip_settings["width"],
         encoded_height_px=clip_settings["height"],
         fingerprints={name: record.fingerprint for name, record in records.items()},
-        licences={dataset.name: dataset.licence},
+        licences={dataset.name: f"{dataset.licence} ({dataset.homepage})" if dataset.homepage else dataset.licence},
         codec_quality=_quality(clips),
         partial=bool(_pending(config)),
     )
