@@ -197,7 +197,7 @@ def _gather(
     for n in range(len(position)):
         if not wanted[n]:
             continue
-        nx, ny, nz = normal[n]
+        nx, ny, nz = normal[n, 0], normal[n, 1], normal[n, 2]
         for k in range(3):
             start[k] = position[n, k] + _LIFT_M * normal[n, k]
         if abs(nz) < 0.9:

@@ -149,6 +149,7 @@ def draw(
     cluster_sphere: Float64Array,
     M: Float64Array,
     K: Float64Array,
+    limits: Float64Array,
     inv_z: Float64Array,
     ids: "np.ndarray",
     planes: Float64Array,
@@ -164,15 +165,17 @@ def draw(
         cluster_sphere: bounding spheres, centre and radius, m; [C, 4].
         M: world to camera, rotation and translation, m; [3, 4].
         K: camera matrix, px.
+        limits: inward unit normals of the four planes that bound the view, in the camera frame; [4, 3].
         inv_z: 1 / depth, 1/m.
         ids: row of `planes` each pixel sees.
         planes: attributes of the drawn triangles; [F, PLANES].
     """
     height, width = inv_z.shape
     fx, fy, cx, cy = K[0, 0], K[1, 1], K[0, 2], K[1, 2]
-    limits = _view_limits(fx, fy, cx, cy, width, height)
-    inv_z[:] = 0.0
-    ids[:] = -1
+    for y in range(height):
+        for x in range(width):
+            inv_z[y, x] = 0.0
+            ids[y, x] = -1
     v, E, W, bounds = np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty(4)
     count = 0
     for cluster in range(len(cluster_sphere)):
@@ -189,8 +192,10 @@ def draw(
             if bounds[1] < 0 or bounds[0] > width - 1 or bounds[3] < 0 or bounds[2] > height - 1:
                 continue
             if det < 0.0:
-                E *= -1.0
                 det = -det
+                for i in range(3):
+                    for k in range(3):
+                        E[i, k] = -E[i, k]
             for k in range(3):
                 W[k] = (E[0, k] + E[1, k] + E[2, k]) / det
             if _fill(E, W, bounds, count, inv_z, ids):
@@ -198,19 +203,6 @@ def draw(
                 planes[count, 16] = f
                 count += 1
     return count
-
-
-@njit(cache=True)  # type: ignore[untyped-decorator]
-def _view_limits(fx: float, fy: float, cx: float, cy: float, width: int, height: int) -> Float64Array:
-    """Inward unit normals of the four planes through the camera and the image's outermost pixel centres."""
-    limits = np.zeros((4, 3))
-    limits[0] = (fx, 0.0, cx)
-    limits[1] = (-fx, 0.0, width - 1 - cx)
-    limits[2] = (0.0, fy, cy)
-    limits[3] = (0.0, -fy, height - 1 - cy)
-    for i in range(4):
-        limits[i] /= np.sqrt((limits[i] ** 2).sum())
-    return limits
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
@@ -300,7 +292,8 @@ def shade(
             while last < limit and ids[y, last + 1] == row:
                 last += 1
             if row < 0:
-                rgb_u8[y, first : last + 1] = 0
+                for x in range(first, last + 1):
+                    rgb_u8[y, x, 0] = rgb_u8[y, x, 1] = rgb_u8[y, x, 2] = 0
                 first = last + 1
                 continue
             # coordinates and light are exact at both ends of the span, and straight in between

@@ -97,6 +97,7 @@ def render(
         mesh.cluster_sphere,
         T_camera_world,
         intrinsics.matrix,
+        _view_limits(intrinsics),
         used.inv_z,
         used.ids,
         used.planes,
@@ -115,3 +116,12 @@ def render(
         used.depth_m,
     )
     return used.rgb_u8, used.depth_m
+
+
+def _view_limits(camera: Intrinsics) -> Float64Array:
+    """Inward unit normals of the four planes through the camera and the image's outermost pixel centres; [4, 3]."""
+    right, bottom = camera.width - 1 - camera.cx, camera.height - 1 - camera.cy
+    normals = np.array(
+        [(camera.fx, 0.0, camera.cx), (-camera.fx, 0.0, right), (0.0, camera.fy, camera.cy), (0.0, -camera.fy, bottom)]
+    )
+    return normals / np.linalg.norm(normals, axis=1, keepdims=True)

@@ -39,7 +39,7 @@ def _triangle_counts(cells: NDArray[np.int64]) -> NDArray[np.int64]:
     """How many points of grids of m x n cells lie in the half below the diagonal."""
     counts = np.zeros(len(cells), np.int64)
     for p in range(len(cells)):
-        m, n = cells[p]
+        m, n = cells[p, 0], cells[p, 1]
         for j in range(n + 1):
             counts[p] += (m * (n - j)) // n + 1
     return counts
@@ -53,7 +53,7 @@ def _fill(
     for p in range(len(corners)):
         if counts[p] == 0:
             continue
-        m, n = cells[p]
+        m, n = cells[p, 0], cells[p, 1]
         for j in range(n + 1):
             last = m if quad[p] else (m * (n - j)) // n
             for i in range(last + 1):
