@@ -125,9 +125,10 @@ def main() -> None:
         "",
         *table(header, [row(name, camera, results[name]) for name, camera in CAMERAS.items()]),
         "",
-        f"Home {scene} of seed 0, {triangles} triangles; frames/s, medians of {ROUNDS} interleaved rounds. Ours is colour,",
-        "textures and light included; the rays give depth alone. Depth errors are relative; grazing rays are pixels above",
-        "1e-6, which meet an edge and are given to the other of two surfaces. The target is 200 frames/s at 480 x 270.",
+        f"Home {scene} of seed 0, {triangles} triangles; frames/s, medians of {ROUNDS} interleaved rounds. Ours is",
+        "colour, textures and light included; the rays give depth alone. Depth errors are relative; grazing rays are",
+        "pixels above 1e-6, which meet an edge and are given to the other of two surfaces. The target is 200 frames/s at",
+        "480 x 270.",
         "",
         machine_line(record),
     ]
