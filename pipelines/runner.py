@@ -121,11 +121,11 @@ def run_stage(
         engine=engine,
     )
     if options.dry_run:
-        job.ledger.update(read_ledger(out))
+        job.ledger.update(_standing(out))
         return stage_report(stage.name, out, job.settled(), [unit.id for unit in _selected(job)], 0.0)
     with _full_disk_named(out), locked(out):
         remove_temporaries(out)
-        job.ledger.update(read_ledger(out))
+        job.ledger.update(_standing(out))
         todo = _selected(job)
         if todo or not _is_finished(job):
             write_stage_record(out, record)  # unfinished from here to the end, for whoever reads it
@@ -187,6 +187,12 @@ def _choose_folder(out: Path, record: StageRecord, fork: bool) -> Path:
     )
 
 
+def _standing(out: Path) -> dict[str, LedgerEntry]:
+    """The last word on every unit whose outputs are still there; one whose outputs are gone is pending again."""
+    ledger = read_ledger(out)
+    return {unit: one for unit, one in ledger.items() if all((out / output).exists() for output in one.outcome.outputs)}
+
+
 def _selected(job: _Job) -> list[Unit]:
     """Pending units that the options ask for, in the order of the listing."""
     only = job.options.only
@@ -202,9 +208,7 @@ def _is_settled(job: _Job, unit: Unit) -> bool:
     entry = job.ledger.get(unit.id)
     if entry is None or entry.key != job.keys[unit.id]:
         return False
-    if entry.outcome.state == REFUSED:
-        return not job.options.retry_refused
-    return all((job.out / name).exists() for name in entry.outcome.outputs)
+    return entry.outcome.state != REFUSED or not job.options.retry_refused
 
 
 def _work(job: _Job, todo: Sequence[Unit]) -> None:
