@@ -127,8 +127,8 @@ def main() -> None:
         "",
         f"Home {scene} of seed 0, {triangles} triangles; frames/s, medians of {ROUNDS} interleaved rounds. Ours is",
         "colour, textures and light included; the rays give depth alone. Depth errors are relative; grazing rays are",
-        "pixels above 1e-6, which meet an edge and are given to the other of two surfaces. The target is 200 frames/s at",
-        "480 x 270.",
+        "pixels above 1e-6, which meet an edge and are given to the other of two surfaces. The target is 200",
+        "frames/s at 480 x 270.",
         "",
         machine_line(record),
     ]
