@@ -27,9 +27,17 @@ def normalise_depth(depth_m: NDArray[np.floating], depth_range: DepthRange) -> F
 
 def log_depth_table(encoding: DepthEncoding, depth_range: DepthRange) -> Float32Array:
     """The normalised depth 2u - 1 of every raw code, float32 [65536]; codes without a measurement hold +1."""
-    depth_m = np.arange(_RAW_CODES) * encoding.metres_per_unit
-    depth_m[list(encoding.invalid_codes)] = 0
-    return normalise_depth(depth_m, depth_range)
+    return normalise_depth(depth_m_from_raw(np.arange(_RAW_CODES, dtype=np.uint16), encoding), depth_range)
+
+
+def depth_m_from_raw(raw_u16: Uint16Array, encoding: DepthEncoding) -> Float32Array:
+    """Depth of raw codes in metres along the optical axis, float32 in the shape of `raw_u16`; 0 = no measurement.
+
+    The product is formed in float64 and rounded once, so it does not depend on how `metres_per_unit` rounds to float32.
+    """
+    depth_m = (raw_u16.astype(np.float64) * encoding.metres_per_unit).astype(np.float32)
+    depth_m[~is_measured(raw_u16, encoding)] = 0
+    return depth_m
 
 
 def is_measured(raw_u16: Uint16Array, encoding: DepthEncoding) -> BoolArray:

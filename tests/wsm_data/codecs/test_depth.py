@@ -5,6 +5,7 @@ from hypothesis import strategies as st
 
 from wsm_data.codecs.depth import (
     depth_m_from_latent_video,
+    depth_m_from_raw,
     is_measured,
     log_depth_table,
     normalise_depth,
@@ -48,6 +49,15 @@ def test_the_table_follows_the_encoding_of_the_source():
     assert table[8] == -1
     codes = np.arange(65536, dtype=np.uint16).reshape(256, 256)
     assert np.argwhere(~is_measured(codes, millimetres)).tolist() == [[0, 0], [0, 7]]
+
+
+def test_raw_codes_become_metres_rounded_once_and_zero_where_nothing_was_measured():
+    codes = np.arange(65536, dtype=np.uint16).reshape(256, 256)
+    depth_m = depth_m_from_raw(codes, ENCODING)
+    assert depth_m.dtype == np.float32
+    assert depth_m[codes == 10_000] == 1
+    wanted = [0 if code in (0, 65535) else np.float32(code * 1e-4) for code in codes.ravel().tolist()]
+    assert np.array_equal(depth_m.ravel(), wanted)
 
 
 @given(depth_m=st.floats(0.2, 5.0))
