@@ -117,6 +117,11 @@ def _fitted_text(figure: Figure, top_px: float, text: str, **style: Any) -> None
         artist.set_text(elided(text, characters))
 
 
+def percent(share: float) -> str:
+    """A share in whole per cent: a caption must not run into the number of the next picture."""
+    return f"{100 * share:.0f} %"
+
+
 def elided(text: str, characters: int) -> str:
     """Text of at most so many characters, its middle replaced by an ellipsis where it is longer."""
     if len(text) <= characters:
@@ -139,7 +144,7 @@ def _draw_band(figure: Figure, clip: Clip, pictures: ClipPictures, shown: Sequen
             axes.set_axis_off()
         caption_px = depth_top_px + band.row_px + 5
         _text(figure, left_px, caption_px, str(index + 1), fontsize=10, fontweight="bold", color=PATH_COLOUR)
-        caption = f"frame {pictures.frames[index]}, {pictures.depth_valid_share[index]:.1%} measured"
+        caption = f"frame {pictures.frames[index]}, {percent(pictures.depth_valid_share[index])} measured"
         _text(figure, left_px + 24, caption_px, caption, fontsize=10, color=MUTED)
     bar_left_px = _MARGIN_PX + _LABEL_PX + _COLUMNS * (band.picture_px + _GAP_PX) + 4
     draw_depth_bar(_axes(figure, bar_left_px, depth_top_px, 14, band.row_px), clip.meta.depth_range)

@@ -52,9 +52,9 @@ def test_every_axis_has_a_unit(figure, made):
 
 def test_each_picture_names_its_frame_and_its_measured_share(figure):
     texts = texts_of(figure)
-    assert "frame 0, 100.0% measured" in texts
-    assert "frame 1, 87.5% measured" in texts
-    assert "frame 8, 100.0% measured" in texts
+    assert "frame 0, 100 % measured" in texts
+    assert "frame 1, 88 % measured" in texts
+    assert "frame 8, 100 % measured" in texts
 
 
 def test_no_text_overlaps_another(figure):
