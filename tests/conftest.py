@@ -4,6 +4,7 @@ import hashlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import settings
 
@@ -97,3 +98,42 @@ def file_digests() -> Callable[[Path], dict[str, str]]:
         }
 
     return digests
+
+
+@pytest.fixture(scope="session")
+def distance_to_mesh_m() -> Callable[..., np.ndarray]:
+    """The distance of points to triangles as formulas say it, without an index: the judge of what lies on a surface."""
+    return _distance_to_mesh_m
+
+
+def _distance_to_mesh_m(points: np.ndarray, triangles: np.ndarray, reach_m: float = 0.5) -> np.ndarray:
+    """Distance of points [N, 3] to the nearest of triangles [F, 3, 3], at most `reach_m`; slow and obvious."""
+    low, high = triangles.min(axis=1) - reach_m, triangles.max(axis=1) + reach_m
+    distances = np.full(len(points), reach_m)
+    for number, point in enumerate(points):
+        near = triangles[((point >= low) & (point <= high)).all(axis=1)]
+        if len(near):
+            distances[number] = min(reach_m, _point_to_triangles_m(point, near).min())
+    return distances
+
+
+def _point_to_triangles_m(point: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """The foot of the perpendicular where it falls into the triangle, else the nearest point of an edge."""
+    a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
+    normal = np.cross(b - a, c - a)
+    doubled = np.linalg.norm(normal, axis=1)
+    sound = doubled > 1e-12
+    unit = normal / np.where(sound, doubled, 1.0)[:, None]
+    height = ((point - a) * unit).sum(axis=1)
+    foot = point - height[:, None] * unit
+    inside = sound.copy()
+    for start, end in ((a, b), (b, c), (c, a)):
+        inside &= (np.cross(end - start, foot - start) * unit).sum(axis=1) >= 0
+    edges = [_point_to_segments_m(point, start, end) for start, end in ((a, b), (b, c), (c, a))]
+    return np.where(inside, np.abs(height), np.min(edges, axis=0))
+
+
+def _point_to_segments_m(point: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
+    along = end - start
+    share = ((point - start) * along).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1e-18)
+    return np.linalg.norm(start + np.clip(share, 0, 1)[:, None] * along - point, axis=1)

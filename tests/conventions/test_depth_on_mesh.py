@@ -31,39 +31,6 @@ LIMIT_M = 0.005
 """What the project promises for the median; the code's step is 0.1 mm, float32 poses are good to a micrometre."""
 
 
-def distance_to_mesh_m(points: np.ndarray, triangles: np.ndarray, reach_m: float = 0.5) -> np.ndarray:
-    """Distance of points [N, 3] to the nearest of triangles [F, 3, 3], at most `reach_m`; slow and obvious."""
-    low, high = triangles.min(axis=1) - reach_m, triangles.max(axis=1) + reach_m
-    distances = np.full(len(points), reach_m)
-    for number, point in enumerate(points):
-        near = triangles[((point >= low) & (point <= high)).all(axis=1)]
-        if len(near):
-            distances[number] = min(reach_m, _point_to_triangles_m(point, near).min())
-    return distances
-
-
-def _point_to_triangles_m(point: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """The foot of the perpendicular where it falls into the triangle, else the nearest point of an edge."""
-    a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
-    normal = np.cross(b - a, c - a)
-    doubled = np.linalg.norm(normal, axis=1)
-    sound = doubled > 1e-12
-    unit = normal / np.where(sound, doubled, 1.0)[:, None]
-    height = ((point - a) * unit).sum(axis=1)
-    foot = point - height[:, None] * unit
-    inside = sound.copy()
-    for start, end in ((a, b), (b, c), (c, a)):
-        inside &= (np.cross(end - start, foot - start) * unit).sum(axis=1) >= 0
-    edges = [_point_to_segments_m(point, start, end) for start, end in ((a, b), (b, c), (c, a))]
-    return np.where(inside, np.abs(height), np.min(edges, axis=0))
-
-
-def _point_to_segments_m(point: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    along = end - start
-    share = ((point - start) * along).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1e-18)
-    return np.linalg.norm(start + np.clip(share, 0, 1)[:, None] * along - point, axis=1)
-
-
 @pytest.fixture(scope="module")
 def trajectory(make_source, run_pipeline, tmp_path_factory):
     """A clip, its source record and frames, and the triangles of its home."""
@@ -90,7 +57,7 @@ def _stored_poses(clip) -> np.ndarray:
     return clip.meta.T_world_camera0_matrix @ transforms_from_vectors(clip.poses.astype(np.float64))
 
 
-def _native_errors_m(trajectory, T_world_camera: np.ndarray) -> np.ndarray:
+def _native_errors_m(trajectory, distance_to_mesh_m, T_world_camera: np.ndarray) -> np.ndarray:
     _, record, frames, dataset, triangles = trajectory
     errors = []
     for frame in FRAMES:
@@ -101,14 +68,14 @@ def _native_errors_m(trajectory, T_world_camera: np.ndarray) -> np.ndarray:
     return np.concatenate(errors)
 
 
-def test_depth_at_its_stored_size_lies_on_the_mesh(trajectory):
+def test_depth_at_its_stored_size_lies_on_the_mesh(trajectory, distance_to_mesh_m):
     """Quantisation included, resize excluded: a tenth of a millimetre, and not the limit, is what is expected."""
-    errors = _native_errors_m(trajectory, _stored_poses(trajectory[0]))
+    errors = _native_errors_m(trajectory, distance_to_mesh_m, _stored_poses(trajectory[0]))
     assert np.median(errors) < 0.0003
     assert np.percentile(errors, 99) < LIMIT_M
 
 
-def test_resized_depth_with_the_intrinsics_of_the_clip_lies_on_the_mesh(trajectory):
+def test_resized_depth_with_the_intrinsics_of_the_clip_lies_on_the_mesh(trajectory, distance_to_mesh_m):
     """Resize included: the nearest measurement may lie half a source pixel beside the new pixel's ray."""
     clip, _, frames, dataset, triangles = trajectory
     wide = replace(DepthRange(), max_m=6.5)  # beyond 5 m the codec's range would clip, which is no error of geometry
@@ -121,9 +88,9 @@ def test_resized_depth_with_the_intrinsics_of_the_clip_lies_on_the_mesh(trajecto
     assert np.median(errors) < LIMIT_M
 
 
-def test_with_the_axes_of_another_convention_it_does_not(trajectory):
+def test_with_the_axes_of_another_convention_it_does_not(trajectory, distance_to_mesh_m):
     clip = trajectory[0]
-    errors = _native_errors_m(trajectory, _stored_poses(clip) @ T_OPENGL_OPENCV)
+    errors = _native_errors_m(trajectory, distance_to_mesh_m, _stored_poses(clip) @ T_OPENGL_OPENCV)
     assert np.median(errors) > 10 * LIMIT_M
 
 
