@@ -167,7 +167,8 @@ def test_a_run_killed_again_and_again_still_ends_in_the_same_bytes(undisturbed, 
     (tmp_path / "recipe.toml").write_text(RECIPE)
     run = tmp_path / "run"
     for lines in (1, 2, 3):
-        _kill_when(_start(make_source(), run, tmp_path / "recipe.toml", workers=2), run, _has_lines("encode", lines))
+        process = _start(make_source(), run, tmp_path / "recipe.toml", workers=2)
+        assert _kill_when(process, run, _has_lines("encode", lines)), f"nothing was killed at {lines} clips"
     process = _start(make_source(), run, tmp_path / "recipe.toml", workers=2)
     _, errors = process.communicate(timeout=300)
     assert process.returncode == 0, errors.decode()
