@@ -2,11 +2,12 @@
 # The virtual environment is made on the first call and again when pyproject.toml or constraints.txt change.
 
 PYTHON ?= python3
-VENV := .venv
+VENV ?= .venv
 BIN := $(VENV)/bin
 # Byte code is left to the first import of a module: most modules that are installed are never imported.
 INSTALL := $(BIN)/python -m pip -qq --disable-pip-version-check install --no-compile
 DEMO_OUT ?= runs/demo
+PYTEST_OPTIONS ?=
 
 .PHONY: demo test check bench
 .DELETE_ON_ERROR:
@@ -15,7 +16,7 @@ demo: $(VENV)/.ready
 	$(BIN)/wsm demo --out $(DEMO_OUT)
 
 test: $(VENV)/.ready-dev
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest $(PYTEST_OPTIONS)
 
 check: $(VENV)/.ready-dev
 	$(BIN)/ruff format --check .

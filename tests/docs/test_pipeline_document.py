@@ -9,9 +9,12 @@ from typer.testing import CliRunner
 from pipelines.cli import app
 from pipelines.registry import STAGES
 from wsm_data.errors import Reason
+from wsm_data.synth.config import SynthConfig
 
 ROOT = Path(__file__).parents[2]
 PAGES = ("README.md", "docs/pipeline.md")
+WRITTEN = (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").glob("*.md"))
+LINK = re.compile(r"(?:(?<=\]\()|(?<=\]: ))[^()\s]+")
 
 
 def test_every_reason_code_is_explained_and_no_other():
@@ -31,3 +34,22 @@ def test_every_option_in_the_documentation_exists(page):
     options = set(re.findall(r"(?<![\w-])--[a-z][a-z-]+", text))
     helped = "".join(CliRunner().invoke(app, [name, "--help"]).output for name in ("run", "inspect", "verify"))
     assert options - {one for one in options if one in helped} == set()
+
+
+@pytest.mark.parametrize("page", sorted(path.relative_to(ROOT).as_posix() for path in WRITTEN))
+def test_every_relative_link_and_picture_exists(page):
+    path = ROOT / page
+    targets = {target.partition("#")[0] for target in LINK.findall(path.read_text())}
+    local = {target for target in targets if target and "://" not in target}
+    assert {target for target in local if not (path.parent / target).exists()} == set()
+
+
+def test_the_pattern_finds_links_pictures_and_definitions():
+    text = "see [a](docs/a.md#part) and ![b](docs/b.png)\n\n[c]: docs/c.md\n"
+    assert LINK.findall(text) == ["docs/a.md#part", "docs/b.png", "docs/c.md"]
+
+
+def test_clips_in_the_documentation_are_named_as_generated_scenes_are():
+    named = {scene for page in PAGES for scene in re.findall(r"home_\d+", (ROOT / page).read_text())}
+    assert named <= {SynthConfig().scene_name(index) for index in range(SynthConfig().scenes)}
+    assert named
