@@ -14,7 +14,7 @@ from wsm_data.schema.verdict import Verdict
 class PoseJumpConfig:
     """When a step between frames is a jump: it is far above the episode's own steps, and large in itself.
 
-    Time is not known (spec/interndata_n1.md), so that no speed can be asked for; the frames of a planned path lie 3 to
+    InternData-N1 stores no time, so that no speed can be asked for; the frames of a planned path lie 3 to
     10 cm and a few degrees apart.
 
     Attributes:

@@ -1,6 +1,5 @@
 """Files of a scene into a folder or an archive, whole or not at all."""
 
-import os
 import shutil
 import tarfile
 from collections.abc import Iterable
@@ -20,9 +19,13 @@ _GZIP = 31  # zlib's window bits of 15, and 16 for a gzip header, which then has
 
 
 def write_folder(path: Path, members: Iterable[Member]) -> None:
-    """Write all members below `path`, which appears only when it is complete; an older one is replaced."""
+    """Write all members below `path`, which appears only when it is complete; an older one is replaced.
+
+    The temporary folder always has the same name, so that the next writer of `path` removes what a killed one left; two
+    at once are not provided for: a stage's folder has one owner.
+    """
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.partial_folder")
+    temporary = path.with_name(f".{path.name}.partial_folder")
     shutil.rmtree(temporary, ignore_errors=True)
     try:
         temporary.mkdir()
@@ -33,9 +36,8 @@ def write_folder(path: Path, members: Iterable[Member]) -> None:
         if path.exists():
             shutil.rmtree(path)
         temporary.rename(path)
-    except BaseException:
-        shutil.rmtree(temporary, ignore_errors=True)
-        raise
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)  # there is none once it has been renamed
 
 
 def write_archive(path: Path, top: str, members: Iterable[Member], level: int) -> None:

@@ -1,7 +1,8 @@
 """The expert: smooth ways through a home, and the camera that is carried along them.
 
-As the generator of InternData-N1 is described (spec/interndata_n1.md): planning at 0.05 m with clearance, waypoints
-every 0.2 m, cubic splines through them, camera yaw along the tangent, one mount height and pitch per episode.
+As the generator of InternData-N1 is described on its data set card and by its maintainers in public issues: planning at
+0.05 m with clearance, waypoints every 0.2 m, cubic splines through them, camera yaw along the tangent, one mount height
+and pitch per episode.
 """
 
 from dataclasses import dataclass

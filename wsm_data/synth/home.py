@@ -10,6 +10,7 @@ from scipy import ndimage
 
 from wsm_data.schema.arrays import BoolArray, Float64Array
 from wsm_data.synth.atlas import paint_atlas
+from wsm_data.synth.config import SynthConfig
 from wsm_data.synth.furnishing import furnish_room, threshold
 from wsm_data.synth.furniture.piece import Piece, Rectangle
 from wsm_data.synth.lighting import VOXEL_M, bake
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 _CHECK_CELL_M = 0.05
 _PASSAGE_M = 0.34  # half of the narrowest way that counts when a furnished room is checked, m
 _MIN_ROOM_M2 = 0.8
+_T_GLTF_WORLD = np.array([[1.0, 0, 0, 0], [0, 0, 1.0, 0], [0, -1.0, 0, 0], [0, 0, 0, 1.0]])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,12 +50,15 @@ class Home:
     floor_patch: BoolArray
 
 
-def make_home(seed: int, scene_index: int) -> Home:
-    """Build scene number `scene_index` of a source; the same arguments give the same home to the bit."""
+def make_home(seed: int, scene_index: int, ground_clearance_m: float = SynthConfig.ground_clearance_m) -> Home:
+    """Build scene number `scene_index` of a source; the same arguments give the same home to the bit.
+
+    Furniture no higher than `ground_clearance_m` is driven over, and leaves a room open that it stands in the way of.
+    """
     rng_plan, rng_style, rng_rooms, rng_paint = np.random.default_rng([seed, scene_index]).spawn(4)
     plan = make_plan(rng_plan)
     style = choose_style(rng_style)
-    furniture = _furnish(rng_rooms, plan, style)
+    furniture = _furnish(rng_rooms, plan, style, ground_clearance_m)
     shell = _shell(rng_style, plan, style)
     parts = [*shell, *(item.surface for item in furniture)]
     surface = join(parts)
@@ -86,18 +91,19 @@ def _floor_patches(surface: Surface) -> BoolArray:
     return np.asarray(flat & surface.quad & (surface.normals[:, 0, 2] > 0.5))
 
 
-def _furnish(rng: np.random.Generator, plan: FloorPlan, style: Style) -> list[Piece]:
+def _furnish(rng: np.random.Generator, plan: FloorPlan, style: Style, ground_clearance_m: float) -> list[Piece]:
     """Furnish every room so that each can be entered; a room that is too full is done again with less in it."""
     streams = rng.spawn(len(plan.rooms))
     rooms: list[list[Piece]] = [furnish_room(streams[i], room, plan, style, 1.0) for i, room in enumerate(plan.rooms)]
     for fullness in (0.8, 0.6, 0.4, 0.0):
-        blocked = _blocked_rooms(plan, [item for pieces in rooms for item in pieces])
+        obstacles = [item for pieces in rooms for item in pieces if item.height_m > ground_clearance_m]
+        blocked = _blocked_rooms(plan, obstacles)
         for i in blocked:
             rooms[i] = furnish_room(streams[i], plan.rooms[i], plan, style, fullness)
     return [item for pieces in rooms for item in pieces]
 
 
-def _blocked_rooms(plan: FloorPlan, furniture: Sequence[Piece]) -> list[int]:
+def _blocked_rooms(plan: FloorPlan, obstacles: Sequence[Piece]) -> list[int]:
     """Rooms of which a robot that comes from the others reaches less than a little floor; by footprints alone."""
     x0, y0 = min(r.x0 for r in plan.rooms), min(r.y0 for r in plan.rooms)
     size = (max(r.y1 for r in plan.rooms) - y0, max(r.x1 for r in plan.rooms) - x0)
@@ -112,10 +118,9 @@ def _blocked_rooms(plan: FloorPlan, furniture: Sequence[Piece]) -> list[int]:
     for opening in plan.openings:
         if opening.kind != "window":
             free[window(threshold(opening))] = True
-    for item in furniture:
-        if item.height_m > 0.15:
-            for footprint in item.footprints:
-                free[window(footprint)] = False
+    for item in obstacles:
+        for footprint in item.footprints:
+            free[window(footprint)] = False
     passable = ndimage.distance_transform_edt(free) * _CHECK_CELL_M > _PASSAGE_M
     labels, count = ndimage.label(passable)
     largest = int(np.argmax(np.bincount(labels.ravel())[1:])) + 1 if count else -1
@@ -132,6 +137,18 @@ def home_trimesh(home: Home) -> "trimesh.Trimesh":
     patch: NDArray[np.int64] = np.repeat(np.arange(len(home.surface)), np.where(home.surface.quad, 2, 1))
     colours = np.round(255 * home.mean_colour[patch]).astype(np.uint8)
     return trimesh.Trimesh(vertices=points.reshape(-1, 3), faces=faces, face_colors=colours, process=False)
+
+
+def home_glb(home: Home) -> bytes:
+    """The home as a binary glTF that any viewer shows: vertices in world coordinates, m, colours without light.
+
+    glTF's own up is y. The vertices stay in the world's axes, z up, and the node that holds them turns them.
+    """
+    import trimesh
+
+    scene = trimesh.Scene()
+    scene.add_geometry(home_trimesh(home), node_name="home", geom_name="home", transform=_T_GLTF_WORLD)
+    return bytes(scene.export(file_type="glb"))
 
 
 def room_at(plan: FloorPlan, xy_m: tuple[float, float]) -> Room | None:

@@ -12,7 +12,7 @@ from wsm_data.synth.home import Home
 from wsm_data.synth.sampling import sample_surface
 
 CELL_M = 0.05
-"""Side of a planning cell, m (spec/interndata_n1.md: maps at 0.05 m)."""
+"""Side of a planning cell, m, as wide as a cell of InternData-N1's planning maps."""
 
 _SPACING_M = 0.02
 _TALLEST_M = 2.0

@@ -17,7 +17,6 @@ from wsm_data.schema.arrays import Float32Array, Float64Array, Uint8Array
 NEAR_M = 0.01
 """Surfaces nearer than this to the camera plane are not drawn, m."""
 
-TEXEL_BITS = 8  # of a texture sample; its interpolation weights have 8 bits
 LIGHT_BITS = 10  # of a light sample, of which 512 stands for 1; its interpolation weights have 6 bits
 LANES_OF_13 = 0x1FFF1FFF1FFF  # three channels of 13 bits in lanes of 16
 PLANES = 17  # per drawn triangle: u/z, v/z, s/z, t/z, 1/z as planes over the image, texel area, number

@@ -41,7 +41,7 @@ class SceneRecording:
 
 def plan_recording(scene_index: int, camera: str, config: SynthConfig) -> SceneRecording:
     """Build the home and plan all episodes of one camera in it."""
-    home = make_home(config.seed, scene_index)
+    home = make_home(config.seed, scene_index, config.ground_clearance_m)
     columns = scene_columns(home)
     episodes = tuple(
         plan_episode(home, columns, _stream(config, scene_index, camera, _EPISODE_STREAM, number), config)

@@ -1,4 +1,4 @@
-"""The parquet file of an episode, with the columns of InternData-N1 (spec/interndata_n1.md)."""
+"""The parquet file of an episode, with the columns that the public loader of InternData-N1 reads."""
 
 import io
 

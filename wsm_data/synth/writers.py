@@ -1,11 +1,17 @@
-"""Synthetic scenes on disk, in the three layouts in which InternData-N1 exists (spec/interndata_n1.md)."""
+"""Synthetic scenes on disk, in the three layouts in which InternData-N1 exists.
+
+The paths are those of the published archives, and of what the data set's public loader reads: archives of whole scenes,
+the same unpacked, and one folder per trajectory.
+"""
 
 from collections.abc import Iterator
 from pathlib import Path
 
+from wsm_data.files.atomic import write_bytes
 from wsm_data.synth.cloud import ply_bytes, with_path
 from wsm_data.synth.config import SynthConfig
 from wsm_data.synth.containers import Member, write_archive, write_folder
+from wsm_data.synth.home import home_glb
 from wsm_data.synth.metadata import meta_files
 from wsm_data.synth.recording import SceneRecording, plan_recording, record_frames
 from wsm_data.synth.tables import episode_table
@@ -30,8 +36,12 @@ def write_scene(out: Path, scene_index: int, camera: str, config: SynthConfig) -
     Returns:
         Paths of the archive or folders written, relative to `out`, with `/`.
     """
-    recording = plan_recording(scene_index, camera, config)
-    group, scene = config.group(camera), config.scene_name(scene_index)
+    return write_recording(out, plan_recording(scene_index, camera, config), config)
+
+
+def write_recording(out: Path, recording: SceneRecording, config: SynthConfig) -> list[str]:
+    """What `write_scene` does, for a recording that is planned already."""
+    group, scene = config.group(recording.camera), config.scene_name(recording.scene_index)
     if config.layout == "scene_archive":
         write_archive(out / group / f"{scene}.tar.gz", scene, _scene_members(recording, config), config.archive_level)
         return [f"{group}/{scene}.tar.gz"]
@@ -41,6 +51,13 @@ def write_scene(out: Path, scene_index: int, camera: str, config: SynthConfig) -
     names = [f"trajectory_{number:02d}" for number in range(len(recording.episodes))]
     write_folder(out / group / scene, _trajectory_members(recording, names, config))
     return [f"{group}/{scene}/{name}" for name in names]
+
+
+def write_home(out: Path, recording: SceneRecording, config: SynthConfig) -> str:
+    """Write the home of a recording as `<scene>.glb` in `out`, for viewers of 3D models; returns the file's name."""
+    name = f"{config.scene_name(recording.scene_index)}.glb"
+    write_bytes(out / name, home_glb(recording.home))
+    return name
 
 
 def _scene_members(recording: SceneRecording, config: SynthConfig) -> Iterator[Member]:

@@ -41,7 +41,7 @@ def standpoints(home: Home, columns: SceneColumns) -> list[tuple[float, float]]:
 @pytest.fixture
 def known_home(home: Home, monkeypatch: pytest.MonkeyPatch) -> None:
     """Lets recordings of seed 0, scene 0 use the home that was built once; that homes are the same is tested apart."""
-    monkeypatch.setattr(recording, "make_home", lambda seed, scene: {(0, 0): home}[seed, scene])
+    monkeypatch.setattr(recording, "make_home", lambda seed, scene, _clearance_m: {(0, 0): home}[seed, scene])
 
 
 @pytest.fixture(scope="session")

@@ -1,4 +1,6 @@
 import gzip
+import subprocess
+import sys
 import tarfile
 
 import pytest
@@ -39,6 +41,18 @@ def test_a_folder_holds_the_members_and_replaces_an_older_one(tmp_path):
     write_folder(path, MEMBERS)
     found = {file.relative_to(path).as_posix(): file.read_bytes() for file in path.rglob("*") if file.is_file()}
     assert found == dict(MEMBERS)
+
+
+def test_what_a_killed_writer_left_is_removed_by_the_next(tmp_path):
+    killed = "import os, sys; from pathlib import Path; from wsm_data.synth.containers import write_folder\n"
+    killed += "write_folder(Path(sys.argv[1]), (('a', b'1') if n < 3 else os._exit(9) for n in range(9)))"
+    done = subprocess.run([sys.executable, "-c", killed, str(tmp_path / "scene")])
+    assert done.returncode == 9
+    assert [path.name for path in tmp_path.iterdir()] != ["scene"]
+    assert len(list(tmp_path.rglob("*"))) == 2  # the temporary folder and a file in it
+    write_folder(tmp_path / "scene", MEMBERS)
+    assert [path.name for path in tmp_path.iterdir()] == ["scene"]
+    assert not (tmp_path / "scene" / "a").exists()
 
 
 def test_what_fails_half_way_leaves_the_old_state_and_nothing_else(tmp_path):

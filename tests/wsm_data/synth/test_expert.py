@@ -61,7 +61,7 @@ def test_the_camera_looks_along_the_path_and_down_by_the_pitch(episodes):
 
 
 def test_the_mount_looks_along_y_at_yaw_zero_and_stands_at_camera_height(episodes):
-    # spec/interndata_n1.md: rotation about x by 90 deg - pitch, translation z = camera height
+    # as InternData-N1's public loader reads it: rotation about x by 90 deg - pitch, translation z = camera height
     episode = episodes[0]
     mount = episode.T_base_camera.astype(float)
     angle = np.pi / 2 - episode.camera_pitch_rad

@@ -1,8 +1,14 @@
+import io
+from dataclasses import replace
+
 import numpy as np
 import pytest
+import trimesh
 from scipy import ndimage
 
-from wsm_data.synth.home import home_trimesh, make_home, room_at
+from wsm_data.synth import home as home_module
+from wsm_data.synth.furnishing import furnish_room
+from wsm_data.synth.home import home_glb, home_trimesh, make_home, room_at
 from wsm_data.synth.occupancy import clearance
 from wsm_data.synth.surface import Texture
 
@@ -54,6 +60,35 @@ def test_trimesh_sees_the_same_triangles_in_colour(home):
     assert -0.01 < mesh.bounds[0, 2] <= 0.0  # the rims of slanting legs dip into the floor
     assert mesh.bounds[1, 2] == pytest.approx(home.plan.ceiling_m)
     assert len(np.unique(mesh.visual.face_colors, axis=0)) > 20
+
+
+def test_a_viewer_gets_the_home_upright_and_in_world_coordinates_below_one_turned_node(home):
+    data = home_glb(home)
+    assert data == home_glb(home)
+    scene = trimesh.load_scene(io.BytesIO(data), file_type="glb")
+    (model,) = scene.geometry.values()
+    triangles = model.vertices[model.faces]
+    assert np.abs(triangles - home.mesh.points_m).max() < 1e-5  # float32 of some metres
+    assert scene.bounds[1, 1] == pytest.approx(home.plan.ceiling_m)  # glTF's up is y
+    assert len(np.unique(model.visual.vertex_colors, axis=0)) > 20
+
+
+@pytest.mark.parametrize(("ground_clearance_m", "emptied"), [(0.15, True), (0.25, False)])
+def test_a_room_is_furnished_again_only_where_its_way_is_blocked_by_what_is_not_driven_over(
+    ground_clearance_m, emptied, monkeypatch
+):
+    asked = set()
+
+    def with_a_platform(rng, room, plan, style, fullness):
+        """The first piece of a fully furnished room covers all of it, 0.2 m high."""
+        asked.add(fullness)
+        pieces = furnish_room(rng, room, plan, style, fullness)
+        whole = ((room.x0, room.y0, room.x1, room.y1),)
+        return [replace(pieces[0], height_m=0.2, footprints=whole), *pieces[1:]] if fullness == 1.0 else pieces
+
+    monkeypatch.setattr(home_module, "furnish_room", with_a_platform)
+    make_home(0, 0, ground_clearance_m)
+    assert (0.8 in asked) == emptied
 
 
 def test_pictures_rugs_and_windows_are_there(home):

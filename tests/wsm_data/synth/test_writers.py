@@ -20,7 +20,7 @@ def trees(tmp_path_factory, small, home):
     """The same scene in every layout: root and written paths."""
     found = {}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(recording, "make_home", lambda seed, scene: {(0, 0): home}[seed, scene])
+        patch.setattr(recording, "make_home", lambda seed, scene, _clearance_m: {(0, 0): home}[seed, scene])
         for layout in ("scene_archive", "scene_folder", "trajectory_folder"):
             root = tmp_path_factory.mktemp(layout)
             found[layout] = root, write_scene(root, 0, "d435i", replace(small, layout=layout))
