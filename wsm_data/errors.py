@@ -17,10 +17,12 @@ class Reason(StrEnum):
     ARCHIVE_TRUNCATED = "archive.truncated"
     ARCHIVE_CORRUPT = "archive.corrupt"
     ARCHIVE_UNSAFE_MEMBER = "archive.unsafe_member"
+    FILE_UNREADABLE = "file.unreadable"  # the system refuses: a link that leads nowhere, no permission, a broken disk
     CONTAINER_NO_EPISODES = "container.no_episodes"
     CONTAINER_SEVERAL_SCENES = "container.several_scenes"
 
     # episodes
+    EPISODE_MISSING = "episode.missing"
     EPISODE_DUPLICATE = "episode.duplicate"
     EPISODE_TOO_SHORT = "episode.too_short"
     EPISODE_UNSTORABLE_NAME = "episode.unstorable_name"
@@ -40,6 +42,7 @@ class Reason(StrEnum):
     TABLE_UNREADABLE = "table.unreadable"
     TABLE_MISSING_COLUMN = "table.missing_column"
     TABLE_ROW_COUNT = "table.row_count"
+    TABLE_ROW_ORDER = "table.row_order"
     TABLE_BAD_SHAPE = "table.bad_shape"
     POSE_NOT_FINITE = "pose.not_finite"
     POSE_NOT_RIGID = "pose.not_rigid"

@@ -24,22 +24,21 @@ _SHIFTS = np.array([33, 17, 1])
 
 
 def voxels_from_cloud(cloud: PointCloud, colours: CloudColours) -> SurfaceVoxels:
-    """Boxes that hold points of a scene cloud; points in the path's colour are not part of the scene.
+    """Boxes that hold points of a scene cloud. A path drawn into the cloud was taken out when it was read.
 
     Raises:
-        DataError: `cloud.empty` when no point of the scene is there, `cloud.no_obstacles` when none has the obstacle
+        DataError: `cloud.empty` when there is no point, `cloud.no_obstacles` when none has the obstacle
             colour, `cloud.unreadable` when a coordinate is not finite or farther out than the grid of boxes reaches.
     """
     obstacle_rgb = np.array(colours.obstacle_rgb) * 255
-    path_rgb = np.array(colours.path_rgb) * 255
-    keys, bad = _cloud_keys(cloud.xyz_m, cloud.rgb_u8, obstacle_rgb, path_rgb, colours.tolerance * 255)
+    keys, bad = _cloud_keys(cloud.xyz_m, cloud.rgb_u8, obstacle_rgb, colours.tolerance * 255)
     if bad >= 0:
         raise _off_the_grid("a point of the cloud", bad, cloud.xyz_m[bad])
     if not len(keys):
         raise DataError(
             Reason.CLOUD_EMPTY,
-            f"a scene cloud must hold points of the scene, found {len(cloud.xyz_m)} points, all in the path's colour",
-            {"points": len(cloud.xyz_m)},
+            "a scene cloud must hold points of the scene, found none; has it none but the path's?",
+            {"points": 0},
         )
     if not (keys & 1).any():
         raise DataError(
@@ -148,21 +147,16 @@ def _point_keys(xyz_m: Float64Array) -> tuple[np.ndarray, int]:
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
 def _cloud_keys(
-    xyz_m: Float32Array, rgb_u8: Uint8Array, obstacle_rgb: Float64Array, path_rgb: Float64Array, tolerance: float
+    xyz_m: Float32Array, rgb_u8: Uint8Array, obstacle_rgb: Float64Array, tolerance: float
 ) -> tuple[np.ndarray, int]:
-    """Keys with flags of the points that are not in the path's colour, and the first index off the grid or -1."""
+    """Keys with flags of all points, and the index of the first that has none (-1: all have)."""
     keys = np.empty(len(xyz_m), np.int64)
-    count = 0
     for i in range(len(xyz_m)):
-        to_obstacle = to_path = 0.0
+        to_obstacle = 0.0
         for channel in range(3):
             to_obstacle += abs(rgb_u8[i, channel] - obstacle_rgb[channel])
-            to_path += abs(rgb_u8[i, channel] - path_rgb[channel])
-        if to_path < tolerance:
-            continue
         key = _key(float(xyz_m[i, 0]), float(xyz_m[i, 1]), float(xyz_m[i, 2]))
         if key < 0:
-            return keys[:count], i
-        keys[count] = key | (to_obstacle < tolerance)
-        count += 1
-    return keys[:count], -1
+            return keys, i
+        keys[i] = key | (to_obstacle < tolerance)
+    return keys, -1

@@ -17,11 +17,23 @@ from wsm_data.schema.episode import EpisodeRecord
 from wsm_data.schema.identity import EpisodeId
 
 
-def episode_numbers(folder: FolderContents) -> list[int]:
-    """Numbers of the episodes that anything in the folder belongs to, so that one without a table is not forgotten."""
+def episode_numbers(folder: FolderContents, *, in_trajectory: bool, alone: bool) -> list[int]:
+    """Numbers of the episodes that anything in the folder belongs to, so that one without a table is not forgotten.
+
+    Nor is one of which meta/episodes.jsonl is all that is left. In a trajectory folder that file may number its one
+    episode otherwise, or list the others of the scene; above trajectory folders it lists theirs, which are not here.
+
+    Args:
+        folder: what was found.
+        in_trajectory: it is a trajectory folder.
+        alone: the container has no other.
+    """
     named = {episode for episode, _ in (*folder.rgb, *folder.depth) if episode is not None}
     unnamed = any(episode is None for episode, _ in (*folder.rgb, *folder.depth))
-    return sorted({*folder.tables, *named, *(folder.spans if unnamed else ())})
+    found = {*folder.tables, *named, *(folder.spans if unnamed else ())}
+    if in_trajectory:
+        return sorted(found) or sorted(folder.lengths)[:1]
+    return sorted({*found, *folder.lengths} if found or alone else found)
 
 
 def build_record(
@@ -45,6 +57,13 @@ def build_record(
     """
     where = f"{container}: episode {id.text}"
     table = folder.tables.get(number)
+    if table is None and not _has_images(folder, number):
+        raise DataError(
+            Reason.EPISODE_MISSING,
+            f"{where} is named by meta/episodes.jsonl and must have a table and images, found neither; fetch the scene "
+            "again",
+            {"episode": number},
+        )
     if table is None:
         message = f"{where} has images but no data/chunk-*/episode_{number:06d}.parquet; fetch the scene again"
         raise DataError(Reason.TABLE_UNREADABLE, message)
@@ -69,6 +88,11 @@ def build_record(
         notes=(Reason.EPISODE_LENGTH_MISMATCH.value,) if folder.lengths.get(number, frames) != frames else (),
     )
     return record, [key for key, _ in depth]
+
+
+def _has_images(folder: FolderContents, number: int) -> bool:
+    owners = {episode for episode, _ in (*folder.rgb, *folder.depth)}
+    return number in owners or (None in owners and number in folder.spans)
 
 
 def digest_frames(rgb: Sequence[str], depth: Sequence[str]) -> str:

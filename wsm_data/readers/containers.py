@@ -10,6 +10,7 @@ from pathlib import Path
 
 from wsm_data.errors import ConfigError
 from wsm_data.files.digest import digest_json
+from wsm_data.readers.unreadable import error_name
 from wsm_data.schema.dataset import DatasetManifest
 
 _log = logging.getLogger(__name__)
@@ -17,7 +18,13 @@ _log = logging.getLogger(__name__)
 CONTENT_FOLDERS = ("data", "meta", "videos")
 """The folders that hold a scene or a trajectory, in the order they are read."""
 
+SCENE_CLOUD = "meta/pointcloud.ply"
+"""Where a scene keeps its cloud; trajectory folders without one of their own share it."""
+
 _ARCHIVE = re.compile(r"(?P<scene>.+?)\.(tar\.gz|tgz|tar|tar\.[a-z0-9]+|zip|gz)")
+_UNFINISHED = re.compile(
+    r"(?P<whole>.+)\.(part|partial|incomplete|crdownload|download|opdownload|aria2|filepart)", re.I
+)
 
 
 class Layout(StrEnum):
@@ -40,7 +47,8 @@ class Container:
         scene: name of the scene, without the endings of an archive.
         episode: name of the trajectory folder; None for scenes.
         signature: digest of (relative name, size, mtime in ns) of all its files: the cheap test for "was anything
-            touched"; it says nothing about content.
+            touched"; it says nothing about content. A file that cannot be looked at counts with the system's error. The
+            cloud of the scene counts with each of its trajectories.
     """
 
     id: str
@@ -56,25 +64,35 @@ def find_containers(source: Path, dataset: DatasetManifest) -> list[Container]:
     """List everything below `source` that is or should be a scene or a trajectory, sorted by id.
 
     `<group>/<scene>.tar.gz` is an archive, `<group>/<scene>/` a scene, and every further folder in it a trajectory.
-    A folder that turns out to hold nothing is listed as well, so that it is refused by name and not passed over; so is
-    an archive of another kind. Hidden names are not looked at. The same scene may stand there in several forms:
-    each is a container.
+    A folder that turns out to hold nothing is listed as well, so that it is refused by name and not passed over; so are
+    an archive of another kind, an unfinished download, and a link that leads nowhere. Hidden names are not looked at.
+    The same scene may stand there in several forms: each is a container.
 
     Raises:
-        ConfigError: the source is absent, is no folder, or holds no container.
+        ConfigError: the source is absent, is no folder, holds no container, or it or a group cannot be listed.
     """
     if not source.is_dir():
         raise ConfigError(
             f"the source of data set {dataset.name!r} must be a folder of <group>/<scene> folders or archives, "
             f"but {source} {'is a file' if source.exists() else 'does not exist'}"
         )
-    containers = [found for group in _entries(source) if group.is_dir() for found in _in_group(source, group)]
+    try:
+        groups = [(group, _entries(group)) for group in _entries(source) if _is_folder(group)]
+    except OSError as error:
+        message = f"the source of data set {dataset.name!r} and its groups must be folders that can be listed"
+        raise ConfigError(f"{message}, but {error.filename}: {error.strerror}") from error
+    containers = [found for group, entries in groups for found in _in_group(source, group.name, entries)]
     if not containers:
         raise ConfigError(
             f"the source of data set {dataset.name!r} is empty: no <group>/<scene> folder and no "
-            f"<group>/<scene>.tar.gz below {source}"
+            f"<group>/<scene>.tar.gz below {source}; the source is the folder that holds the groups"
         )
     return sorted(containers, key=lambda container: container.id)
+
+
+def is_unfinished(name: str) -> bool:
+    """Whether a file's name is one that programs give to downloads that are not complete."""
+    return _UNFINISHED.fullmatch(name) is not None
 
 
 def _entries(folder: Path | os.DirEntry[str]) -> list[os.DirEntry[str]]:
@@ -82,25 +100,54 @@ def _entries(folder: Path | os.DirEntry[str]) -> list[os.DirEntry[str]]:
         return sorted((entry for entry in entries if not entry.name.startswith(".")), key=lambda entry: entry.name)
 
 
-def _in_group(source: Path, group: os.DirEntry[str]) -> Iterator[Container]:
-    for entry in _entries(group):
-        match = _ARCHIVE.fullmatch(entry.name)
-        if entry.is_dir():
-            yield from _in_scene(source, group.name, entry)
-        elif match:
+def _is_folder(entry: os.DirEntry[str]) -> bool:
+    try:
+        return entry.is_dir()
+    except OSError:  # links in a circle, for one
+        return False
+
+
+def _leads_nowhere(entry: os.DirEntry[str]) -> bool:
+    """Whether it is a link whose target is not there, or cannot be looked at at all."""
+    try:
+        entry.stat()
+    except OSError:
+        return True
+    return False
+
+
+def _in_group(source: Path, group: str, entries: list[os.DirEntry[str]]) -> Iterator[Container]:
+    for entry in entries:
+        unfinished = _UNFINISHED.fullmatch(entry.name)
+        whole = unfinished["whole"] if unfinished else entry.name
+        archive = _ARCHIVE.fullmatch(whole)
+        if _is_folder(entry):
+            yield from _in_scene(source, group, entry)
+        elif archive or unfinished:
             signature = digest_json([_file_line("", entry)])
-            yield _container(source, entry.path, Layout.SCENE_ARCHIVE, group.name, match["scene"], None, signature)
+            scene = archive["scene"] if archive else whole
+            yield _container(source, entry.path, Layout.SCENE_ARCHIVE, group, scene, None, signature)
+        elif _leads_nowhere(entry):
+            signature = digest_json([_file_line("", entry)])
+            yield _container(source, entry.path, Layout.SCENE_FOLDER, group, entry.name, None, signature)
         else:
             _log.warning("%s is neither a scene folder nor an archive; it is not read", entry.path)
 
 
 def _in_scene(source: Path, group: str, scene: os.DirEntry[str]) -> Iterator[Container]:
-    folders = [entry for entry in _entries(scene) if entry.is_dir()]
+    try:
+        folders = [entry for entry in _entries(scene) if _is_folder(entry) or _leads_nowhere(entry)]
+    except OSError as error:  # listed all the same: reading it says why not
+        signature = digest_json([error_name(error)])
+        yield _container(source, scene.path, Layout.SCENE_FOLDER, group, scene.name, None, signature)
+        return
     trajectories = [entry for entry in folders if entry.name not in CONTENT_FOLDERS]
     if not trajectories or any(entry.name in ("data", "videos") for entry in folders):
-        yield _container(source, scene.path, Layout.SCENE_FOLDER, group, scene.name, None, _folder_signature(scene))
+        signature = digest_json(_content_lines(scene))
+        yield _container(source, scene.path, Layout.SCENE_FOLDER, group, scene.name, None, signature)
+    cloud = _scene_cloud_line(scene)
     for entry in trajectories:
-        signature = _folder_signature(entry)
+        signature = digest_json([*_content_lines(entry), *cloud])
         yield _container(source, entry.path, Layout.TRAJECTORY_FOLDER, group, scene.name, entry.name, signature)
 
 
@@ -111,19 +158,41 @@ def _container(
     return Container(id=name, layout=layout, path=name, group=group, scene=scene, episode=episode, signature=signature)
 
 
-def _folder_signature(folder: os.DirEntry[str]) -> str:
-    contents = [entry for entry in _entries(folder) if entry.name in CONTENT_FOLDERS and entry.is_dir()]
-    return digest_json([line for entry in contents for line in _file_lines(f"{entry.name}/", entry)])
+def _content_lines(folder: os.DirEntry[str]) -> list[list[object]]:
+    """A line for each file of a scene or trajectory, and one for each file or folder that cannot be looked at."""
+    try:
+        contents = [entry for entry in _entries(folder) if entry.name in CONTENT_FOLDERS]
+    except OSError as error:
+        return [[folder.name, error_name(error)]]
+    return [line for entry in contents for line in _lines("", entry)]
 
 
-def _file_lines(prefix: str, folder: os.DirEntry[str]) -> Iterator[list[object]]:
-    for entry in _entries(folder):
-        if entry.is_dir():
-            yield from _file_lines(f"{prefix}{entry.name}/", entry)
-        else:
-            yield _file_line(prefix, entry)
+def _lines(prefix: str, entry: os.DirEntry[str]) -> Iterator[list[object]]:
+    if not _is_folder(entry):
+        yield _file_line(prefix, entry)
+        return
+    try:
+        entries = _entries(entry)
+    except OSError as error:
+        yield [f"{prefix}{entry.name}/", error_name(error)]
+        return
+    for inner in entries:
+        yield from _lines(f"{prefix}{entry.name}/", inner)
 
 
 def _file_line(prefix: str, entry: os.DirEntry[str]) -> list[object]:
-    status = entry.stat()
+    try:
+        status = entry.stat()
+    except OSError as error:
+        return [f"{prefix}{entry.name}", error_name(error)]
     return [f"{prefix}{entry.name}", status.st_size, status.st_mtime_ns]
+
+
+def _scene_cloud_line(scene: os.DirEntry[str]) -> list[list[object]]:
+    try:
+        status = Path(scene.path, SCENE_CLOUD).stat()
+    except FileNotFoundError:
+        return []
+    except OSError as error:
+        return [[f"../{SCENE_CLOUD}", error_name(error)]]
+    return [[f"../{SCENE_CLOUD}", status.st_size, status.st_mtime_ns]]

@@ -6,10 +6,10 @@ from pathlib import Path
 
 from wsm_data.errors import DataError, Reason
 from wsm_data.files.digest import xxh3_128
-from wsm_data.readers.containers import Container
+from wsm_data.readers.containers import Container, Layout
 from wsm_data.readers.episode_meta import read_image_spans, read_lengths
 from wsm_data.readers.images import check_jpeg, check_png16
-from wsm_data.readers.members import iter_members
+from wsm_data.readers.members import iter_members, scene_cloud
 from wsm_data.readers.naming import ImageSpan, Kind, Role, role_of
 from wsm_data.readers.ply import read_point_cloud, require_finite_points
 from wsm_data.readers.table import EpisodeTable, read_table
@@ -72,6 +72,11 @@ class Contents:
         """Whether any cloud was found, damaged or not."""
         return any(folder.clouds for folder in self.folders.values())
 
+    def forget_depth(self) -> None:
+        """Let the depth images go: there is a cloud."""
+        for folder in self.folders.values():
+            folder.depth_png.clear()
+
 
 def read_contents(source: Path, container: Container, depth_sample_every: int) -> Contents:
     """Read a container once, from its first file to its last.
@@ -92,9 +97,23 @@ def read_contents(source: Path, container: Container, depth_sample_every: int) -
             if role.kind is Kind.DEPTH and not contents.has_cloud:
                 _keep_depth(folder, role, member, depth_sample_every)
             elif role.kind is Kind.CLOUD:
-                for each in contents.folders.values():
-                    each.depth_png.clear()
+                contents.forget_depth()
+    if container.layout is Layout.TRAJECTORY_FOLDER and not contents.has_cloud:
+        _take_scene_cloud(contents, source, container)
     return contents
+
+
+def _take_scene_cloud(contents: Contents, source: Path, container: Container) -> None:
+    """A trajectory without a cloud of its own has the cloud of its scene."""
+    cloud = scene_cloud(source, container)
+    if cloud is not None:
+        folder = contents.folders.setdefault("", FolderContents())
+        _read_cloud(folder, _SCENE_CLOUD, cloud, f"{container.id}:{cloud.name}")
+        contents.bytes_read += cloud.size
+        contents.forget_depth()
+
+
+_SCENE_CLOUD = Role(Kind.CLOUD, "", None, None)
 
 
 def _keep_depth(folder: FolderContents, role: Role, member: Member, every: int) -> None:
@@ -113,7 +132,7 @@ def _read_table(folder: FolderContents, role: Role, member: Member, where: str) 
         )
         return
     try:
-        folder.tables[number] = read_table(member.data, where)
+        folder.tables[number] = read_table(member.content(), where)
     except DataError as error:
         folder.tables[number] = error
 
@@ -131,7 +150,7 @@ def _read_image(
         if key in images:
             message = f"{where}: each frame must have one image, and {images[key].name} is the same frame; remove one"
             raise DataError(Reason.EPISODE_DUPLICATE, message, {"other": images[key].name})
-        size = check(member.data, where)
+        size = check(member.content(), where)
     except DataError as error:
         refusal = error
     images[key] = ImageFacts(member.name, size, xxh3_128(member.data), refusal)
@@ -139,7 +158,7 @@ def _read_image(
 
 def _read_cloud(folder: FolderContents, _role: Role, member: Member, where: str) -> None:
     try:
-        cloud = read_point_cloud(bytes(member.data))
+        cloud = read_point_cloud(bytes(member.content()))
         require_finite_points(cloud)
         folder.clouds[member.name] = cloud
     except DataError as error:
@@ -147,11 +166,11 @@ def _read_cloud(folder: FolderContents, _role: Role, member: Member, where: str)
 
 
 def _read_lengths(folder: FolderContents, _role: Role, member: Member, _where: str) -> None:
-    folder.lengths.update(read_lengths(member.data))
+    folder.lengths.update(read_lengths(member.content()))
 
 
 def _read_spans(folder: FolderContents, _role: Role, member: Member, _where: str) -> None:
-    folder.spans.update(read_image_spans(member.data))
+    folder.spans.update(read_image_spans(member.content()))
 
 
 _READ: Mapping[Kind, Callable[[FolderContents, Role, Member, str], None]] = {

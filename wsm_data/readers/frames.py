@@ -9,6 +9,7 @@ from wsm_data.files.digest import xxh3_128
 from wsm_data.readers.assemble import digest_frames
 from wsm_data.readers.containers import Container, Layout
 from wsm_data.readers.members import iter_members
+from wsm_data.readers.unreadable import refusing_unreadable
 from wsm_data.schema.episode import EpisodeRecord
 
 
@@ -50,11 +51,16 @@ def iter_episode_frames(
 def _from_folder(root: Path, records: Sequence[EpisodeRecord]) -> Iterator[tuple[EpisodeRecord, EpisodeFrames]]:
     for record in records:
         try:
-            rgb = tuple((root / name).read_bytes() for name in record.rgb_members)
-            depth = tuple((root / name).read_bytes() for name in record.depth_members)
-        except FileNotFoundError as error:
-            raise _changed(record.container, f"{error.filename} is gone") from error
+            rgb = tuple(_image(root, name, record.container) for name in record.rgb_members)
+            depth = tuple(_image(root, name, record.container) for name in record.depth_members)
+        except DataError as error:
+            raise _changed(record.container, error.message) from error
         yield record, _verified(record, EpisodeFrames(rgb=rgb, depth=depth))
+
+
+def _image(root: Path, name: str, container: str) -> bytes:
+    with refusing_unreadable(f"{container}:{name}"):
+        return (root / name).read_bytes()
 
 
 def _from_archive(
@@ -77,7 +83,7 @@ def _from_archive(
                 yield record, _verified(record, EpisodeFrames(rgb=rgb, depth=depth))
                 if not waiting:
                     return
-    except (DataError, FileNotFoundError) as error:
+    except DataError as error:
         raise _changed(container.id, str(error)) from error
     absent = sorted(id_.text for id_ in waiting)
     raise _changed(container.id, f"images of {', '.join(absent[:3])} are gone ({len(absent)} episodes)")

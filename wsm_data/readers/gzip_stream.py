@@ -1,26 +1,35 @@
 """The decompressed bytes of a gzip file in one reused buffer: nothing is allocated or copied for each member."""
 
 import gzip
+import io
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
-from zlib_ng import zlib_ng
+from zlib_ng import gzip_ng, zlib_ng
 
 from wsm_data.errors import DataError, Reason
+from wsm_data.readers.unreadable import refusing_unreadable
 
 _BUFFER_BYTES = 1 << 19
 _GZIP_MAGIC = b"\x1f\x8b"
 _POINTER = b"version https://git-lfs"
+_OTHER_ARCHIVES = {
+    b"PK": "zip",
+    b"BZh": "bzip2",
+    b"\xfd7zXZ": "xz",
+    b"\x28\xb5\x2f\xfd": "Zstandard",
+    b"7z\xbc\xaf": "7-Zip",
+}
+_TAR_MAGIC_AT = 257
 
 
 class GzipStream:
     """Sequential access to the content of a gzip file, several gzip members in a row included."""
 
     def __init__(self, file: BinaryIO, where: str):
-        # The reader behind `gzip_ng.open`, taken directly: `GzipNGFile.readinto` reads into new bytes and copies them.
-        self._reader = zlib_ng._GzipReader(file, _BUFFER_BYTES)
+        self._reader = _reader(file)
         self._where = where
         self._buffer = memoryview(bytearray(_BUFFER_BYTES))
         self._start = self._end = 0
@@ -86,6 +95,15 @@ class GzipStream:
         raise DataError(reason, message, {"position_bytes": self.position})
 
 
+def _reader(file: BinaryIO) -> io.RawIOBase | gzip_ng.GzipNGFile:
+    """The reader behind `gzip_ng.open`, taken directly: `GzipNGFile.readinto` reads into new bytes and copies them.
+
+    It is not a public name, so that a zlib-ng without it is served by the public reader: the same bytes, slower.
+    """
+    direct = getattr(zlib_ng, "_GzipReader", None)
+    return gzip_ng.GzipNGFile(fileobj=file, mode="rb") if direct is None else direct(file, _BUFFER_BYTES)
+
+
 @contextmanager
 def open_gzip(path: Path, where: str) -> Iterator[GzipStream]:
     """Open a gzip file.
@@ -95,9 +113,10 @@ def open_gzip(path: Path, where: str) -> Iterator[GzipStream]:
         where: what to call it in messages.
 
     Raises:
-        DataError: `archive.pointer_file`, `archive.truncated` for a file of no bytes, `archive.not_gzip`.
+        DataError: `archive.pointer_file`, `archive.truncated` for a file of no bytes, `archive.not_gzip`,
+            `file.unreadable`.
     """
-    with path.open("rb", buffering=0) as file:
+    with refusing_unreadable(where), path.open("rb", buffering=0) as file:
         head = file.read(len(_POINTER))
         if head == _POINTER:
             raise DataError(
@@ -106,12 +125,23 @@ def open_gzip(path: Path, where: str) -> Iterator[GzipStream]:
                 "leaves; fetch the file itself with `git lfs pull`",
             )
         if head[:2] != _GZIP_MAGIC[: len(head)]:
-            raise DataError(
-                Reason.ARCHIVE_NOT_GZIP,
-                f"{where} must be a gzip file and start with 1f 8b, found {head[:2].hex(' ')}; download it again",
-                {"first_bytes": head[:2].hex()},
-            )
+            raise _not_gzip(head + file.read(_TAR_MAGIC_AT + 5 - len(head)), where)
         if len(head) < len(_GZIP_MAGIC):
             raise DataError(Reason.ARCHIVE_TRUNCATED, f"{where} has {len(head)} bytes; download it again")
         file.seek(0)
         yield GzipStream(file, where)
+
+
+def _not_gzip(head: bytes, where: str) -> DataError:
+    """Refusal of a file that is another kind of archive, or none."""
+    kind = next((kind for start, kind in _OTHER_ARCHIVES.items() if head.startswith(start)), None)
+    if head[_TAR_MAGIC_AT:] == b"ustar":
+        kind = "uncompressed tar"
+    if kind is None:
+        message = f"{where} must be a gzip file and start with 1f 8b, found {head[:2].hex(' ')}; download it again"
+    else:
+        message = (
+            f"{where} must be a .tar.gz, and is a {kind} archive: only .tar.gz archives are read; unpack it into a "
+            "folder <group>/<scene>, which is read as it is, or pack it anew with `tar -czf`"
+        )
+    return DataError(Reason.ARCHIVE_NOT_GZIP, message, {"first_bytes": head[:2].hex(), "kind": kind})

@@ -11,7 +11,8 @@ from wsm_data.readers.assemble import build_record, episode_numbers
 from wsm_data.readers.containers import Container, Layout
 from wsm_data.readers.contents import Contents, FolderContents, FrameKey, read_contents
 from wsm_data.readers.naming import episode_name
-from wsm_data.schema.dataset import DatasetManifest
+from wsm_data.readers.path_points import without_path
+from wsm_data.schema.dataset import CloudColours, DatasetManifest
 from wsm_data.schema.episode import EpisodeRecord
 from wsm_data.schema.identity import EpisodeId
 from wsm_data.schema.point_cloud import PointCloud
@@ -28,7 +29,7 @@ class ContainerScan:
     Attributes:
         records: the usable episodes, by id.
         refusals: one for each episode that is not, by id; the usable ones go on.
-        cloud: the cloud of the scene, None where there is none or it is damaged.
+        cloud: the points of the scene, None where there is no cloud or it is damaged.
         cloud_refusal: why the cloud cannot be used, None where there is none or it is whole.
         depth_samples: episode text to every n-th depth image, for a map from depth; empty unless the container has
             no cloud at all.
@@ -46,7 +47,7 @@ class ContainerScan:
 
 
 def scan_container(
-    source: Path, container: Container, dataset: DatasetManifest, depth_sample_every: int = 10
+    source: Path, container: Container, dataset: DatasetManifest, depth_sample_every: int
 ) -> ContainerScan:
     """Read a container once and sort what is in it.
 
@@ -75,7 +76,7 @@ def scan_container(
         else:
             records[id_.text] = record
             samples[id_.text] = _samples(folder, depth_keys, depth_sample_every)
-    cloud, cloud_refusal = _cloud(container, contents)
+    cloud, cloud_refusal = _cloud(container, contents, dataset.cloud)
     return ContainerScan(
         records=tuple(records[text] for text in sorted(records)),
         refusals=tuple(refusals[text] for text in sorted(refusals)),
@@ -91,8 +92,8 @@ def _episodes(container: Container, contents: Contents) -> list[tuple[EpisodeId,
     """All episodes of a container, usable or not, in the order of their folders and numbers."""
     found = []
     for name, folder in sorted(contents.folders.items()):
-        numbers = episode_numbers(folder)
         trajectory = container.episode if container.layout is Layout.TRAJECTORY_FOLDER else name
+        numbers = episode_numbers(folder, in_trajectory=bool(trajectory), alone=len(contents.folders) == 1)
         if trajectory and len(numbers) > 1:
             raise DataError(
                 Reason.EPISODE_DUPLICATE,
@@ -106,7 +107,8 @@ def _episodes(container: Container, contents: Contents) -> list[tuple[EpisodeId,
         raise DataError(
             Reason.CONTAINER_NO_EPISODES,
             f"{container.id} must hold a scene or a trajectory (data/chunk-*/episode_*.parquet and images below "
-            "videos/), found no episode; the source must point at the folder of the groups",
+            "videos/), found no episode; remove or complete it, or correct the source: it is the folder that holds the "
+            "groups, with <group>/<scene>.tar.gz, <group>/<scene>/data or <group>/<scene>/<trajectory>/data below it",
         )
     return found
 
@@ -126,17 +128,23 @@ def _samples(folder: FolderContents, depth_keys: list[FrameKey], every: int) -> 
     )
 
 
-def _cloud(container: Container, contents: Contents) -> tuple[PointCloud | None, Refusal | None]:
-    """The cloud of the scene: its own, or of all its trajectory folders together."""
+def _cloud(container: Container, contents: Contents, colours: CloudColours) -> tuple[PointCloud | None, Refusal | None]:
+    """The cloud of the scene: its own, or of all its trajectory folders together, there without their paths."""
     clouds: list[PointCloud] = []
-    for _, folder in sorted(contents.folders.items()):
+    for trajectory, folder in sorted(contents.folders.items()):
         name = min(folder.clouds, key=lambda name: ("path.ply" in name, name), default=None)
         cloud = folder.clouds[name] if name is not None else None
         if isinstance(cloud, DataError):
             return None, Refusal.from_error(container.id, container.id, cloud)
-        if cloud is not None:
-            clouds.append(cloud)
+        if name is not None and cloud is not None:
+            shows_path = _shows_path(name, bool(trajectory) or container.layout is Layout.TRAJECTORY_FOLDER)
+            clouds.append(without_path(cloud, colours) if shows_path else cloud)
     if len(clouds) > 1:
         xyz_m = np.concatenate([cloud.xyz_m for cloud in clouds])
         return PointCloud(xyz_m=xyz_m, rgb_u8=np.concatenate([cloud.rgb_u8 for cloud in clouds])), None
     return (clouds[0] if clouds else None), None
+
+
+def _shows_path(name: str, in_trajectory: bool) -> bool:
+    """Whether black means the path in this cloud: only in a trajectory's own, not in the one its scene lends to it."""
+    return name.endswith("/path.ply") or (in_trajectory and not name.startswith("../"))

@@ -14,6 +14,7 @@ from wsm_data.schema.arrays import Float64Array
 INTRINSIC_COLUMN = "observation.camera_intrinsic"
 MOUNT_COLUMN = "observation.camera_extrinsic"
 POSE_COLUMN = "action"
+INDEX_COLUMN = "index"
 
 RIGIDITY_TOLERANCE = 1e-3
 """Largest accepted `rigidity_error`. Rotations rounded to float32 err by 4e-7, products of some such matrices by 1e-5;
@@ -49,10 +50,13 @@ def read_table(data: memoryview, where: str) -> EpisodeTable:
         where: what to call it in messages.
 
     Raises:
-        DataError: `table.unreadable`, `table.missing_column`, `table.bad_shape`, `pose.not_finite`, `pose.not_rigid`,
+        DataError: `table.unreadable`, `table.missing_column`, `table.bad_shape`, `table.row_order` when there is an
+            index and it does not count the rows up by one, `pose.not_finite`, `pose.not_rigid`,
             `intrinsics.misfit` or `mount.misfit` when they are not finite or change within the episode.
     """
     table = _read_columns(data, where)
+    if INDEX_COLUMN in table.column_names:
+        _require_row_order(table, where)
     K = _matrices(table, INTRINSIC_COLUMN, 3, where)
     T_mount = _matrices(table, MOUNT_COLUMN, 4, where)
     T_world_stored = _matrices(table, POSE_COLUMN, 4, where)
@@ -72,7 +76,8 @@ def _read_columns(data: memoryview, where: str) -> pa.Table:
         with pq.ParquetFile(pa.BufferReader(data)) as file:
             present = file.schema_arrow.names
             absent = [column for column in columns if column not in present]
-            table = None if absent else file.read(columns=columns, use_threads=False)
+            wanted = [*columns, *({INDEX_COLUMN} & set(present))]
+            table = None if absent else file.read(columns=wanted, use_threads=False)
     except (pa.ArrowException, OSError) as error:
         message = f"{where}: must be a parquet file, and cannot be read ({error}); download it again"
         raise DataError(Reason.TABLE_UNREADABLE, message, {"bytes": len(data)}) from error
@@ -85,6 +90,28 @@ def _read_columns(data: memoryview, where: str) -> pa.Table:
     if table.num_rows == 0:
         raise DataError(Reason.TABLE_BAD_SHAPE, f"{where}: must have a row for every frame, found none", {"rows": 0})
     return table
+
+
+def _require_row_order(table: pa.Table, where: str) -> None:
+    """Images are matched to rows by position, so the rows must stand in the order of the frames, from any start."""
+    values = table.column(INDEX_COLUMN).combine_chunks()
+    if not pa.types.is_integer(values.type) or values.null_count:
+        found = f"{values.type} with {values.null_count} nulls"
+        raise DataError(
+            Reason.TABLE_BAD_SHAPE,
+            f"{where}: column {INDEX_COLUMN} must hold a whole number a row, found {found}",
+            {"column": INDEX_COLUMN, "type": str(values.type), "nulls": values.null_count},
+        )
+    index = values.to_numpy(zero_copy_only=False)
+    wrong = np.flatnonzero(index[1:] != index[:-1] + 1)
+    if len(wrong):
+        row = int(wrong[0]) + 1
+        raise DataError(
+            Reason.TABLE_ROW_ORDER,
+            f"{where}: column {INDEX_COLUMN} must rise by one from row to row, but row {row} has {index[row]} after "
+            f"{index[row - 1]}; which pose belongs to which image cannot be told, fetch or repair the table",
+            {"row": row, "index": int(index[row]), "index_before": int(index[row - 1]), "rows": len(index)},
+        )
 
 
 def _matrices(table: pa.Table, column: str, side: int, where: str) -> Float64Array:

@@ -20,11 +20,23 @@ class Member:
         size: bytes of its content.
         data: the content. From an archive it is a view into a reused buffer, valid until the next member is asked for:
             whoever keeps it takes `bytes(member.data)`.
+        refusal: why the system did not give the content, if so; the data is then empty.
     """
 
     name: str
     size: int
     data: memoryview
+    refusal: DataError | None = None
+
+    def content(self) -> memoryview:
+        """The data.
+
+        Raises:
+            DataError: `file.unreadable`.
+        """
+        if self.refusal is not None:
+            raise self.refusal
+        return self.data
 
 
 def walk_tar(path: Path, where: str, wanted: Callable[[str], bool]) -> Iterator[Member]:
@@ -39,8 +51,9 @@ def walk_tar(path: Path, where: str, wanted: Callable[[str], bool]) -> Iterator[
         wanted: of a member's name, whether its content is asked for.
 
     Raises:
-        DataError: one of the `archive.*` reasons: a pointer file, not gzip, truncated anywhere, corrupt, or a member
-            that is a link, a device or of an unknown kind, or whose path is absolute or climbs with `..`.
+        DataError: `file.unreadable`, or one of the `archive.*` reasons: a pointer file, not gzip, truncated anywhere,
+            corrupt, or a member that is a link, a device or of an unknown kind, or whose path is absolute or climbs
+            with `..`.
     """
     with open_gzip(path, where) as stream:
         pax_global: dict[str, str] = {}

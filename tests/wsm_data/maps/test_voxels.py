@@ -8,7 +8,7 @@ from wsm_data.maps.voxels import load_voxels, save_voxels, voxels_digest, voxels
 from wsm_data.schema.dataset import CloudColours
 from wsm_data.schema.point_cloud import PointCloud
 
-GREY, OBSTACLE, PATH = (128, 128, 128), (0, 0, 128), (0, 0, 0)
+GREY, OBSTACLE, BLACK = (128, 128, 128), (0, 0, 128), (0, 0, 0)
 
 
 def cloud_of(points, colours):
@@ -67,9 +67,9 @@ def test_strided_read_only_views_of_a_files_bytes_are_taken_as_they_are():
     assert voxels_digest(strided) == voxels_digest(voxels_from_cloud(cloud_of(points, colours), CloudColours()))
 
 
-def test_points_in_the_paths_colour_are_not_part_of_the_scene():
-    voxels = voxels_from_cloud(cloud_of([[0, 0, 0], [1, 1, 1]], [OBSTACLE, PATH]), CloudColours())
-    assert as_table(voxels) == {(0, 0, 0, True)}
+def test_black_points_are_surface_like_any_other():
+    voxels = voxels_from_cloud(cloud_of([[0, 0, 0], [1, 1, 1]], [OBSTACLE, BLACK]), CloudColours())
+    assert as_table(voxels) == {(0, 0, 0, True), (20, 20, 100, False)}
 
 
 def test_colours_are_told_apart_by_the_sum_of_their_differences():
@@ -79,10 +79,9 @@ def test_colours_are_told_apart_by_the_sum_of_their_differences():
     assert voxels.obstacle.tolist() == [True, True, False]
 
 
-@pytest.mark.parametrize("points", [[], [[0, 0, 0], [1, 0, 0]]])
-def test_a_cloud_without_points_of_the_scene_is_empty(points):
+def test_a_cloud_without_points_is_empty():
     with pytest.raises(DataError) as refused:
-        voxels_from_cloud(cloud_of(points, [PATH] * len(points)), CloudColours())
+        voxels_from_cloud(cloud_of([], []), CloudColours())
     assert refused.value.reason is Reason.CLOUD_EMPTY
 
 

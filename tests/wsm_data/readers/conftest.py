@@ -58,8 +58,16 @@ class TreeBuilder:
             poses=poses.astype(np.float32),
         )
 
-    def table(self, episode: Episode, *, nested: bool = True, drop: str = "", **columns: np.ndarray) -> bytes:
-        """The parquet file; `columns` replace whole columns of matrices [T, n, n]."""
+    def table(
+        self,
+        episode: Episode,
+        *,
+        nested: bool = True,
+        drop: str = "",
+        index: np.ndarray | None = None,
+        **columns: np.ndarray,
+    ) -> bytes:
+        """The parquet file; `columns` replace whole columns of matrices [T, n, n], `index` the numbers of the rows."""
         rows = len(episode.poses)
         matrices = {
             "observation.camera_intrinsic": np.repeat(episode.K[None], rows, axis=0),
@@ -70,7 +78,7 @@ class TreeBuilder:
             matrices[{"K": "observation.camera_intrinsic", "mount": "observation.camera_extrinsic"}.get(name, name)] = (
                 values
             )
-        arrays = {"index": pa.array(np.arange(rows))}
+        arrays = {"index": pa.array(np.arange(rows) if index is None else index)}
         for name, values in matrices.items():
             lists = values.tolist() if nested else values.reshape(len(values), -1).tolist()
             kind = pa.list_(pa.list_(pa.float32())) if nested else pa.list_(pa.float32())
@@ -80,10 +88,11 @@ class TreeBuilder:
         pq.write_table(pa.table(arrays), buffer)
         return buffer.getvalue()
 
-    def cloud(self, points: int = 50) -> bytes:
+    def cloud(self, points: int = 50, black: int = 0) -> bytes:
         rows = np.zeros(points, [("xyz", "<f4", 3), ("rgb", "u1", 3)])
         rows["xyz"] = np.random.default_rng(1).uniform(-2, 2, (points, 3))
         rows["rgb"] = (0, 0, 128)
+        rows["rgb"][:black] = 0
         header = f"ply\nformat binary_little_endian 1.0\nelement vertex {points}\n"
         fields = [f"property float {a}\n" for a in "xyz"] + [f"property uchar {c}\n" for c in ("red", "green", "blue")]
         return (header + "".join(fields) + "end_header\n").encode() + rows.tobytes()
@@ -196,9 +205,9 @@ def dataset() -> DatasetManifest:
 def scan_all(tmp_path: Path, dataset: DatasetManifest):
     """Scan every container below the test's source tree."""
 
-    def scan(source: Path = tmp_path, **options: int) -> dict[str, ContainerScan]:
+    def scan(source: Path = tmp_path, depth_sample_every: int = 10) -> dict[str, ContainerScan]:
         found: list[Container] = find_containers(source, dataset)
-        return {container.id: scan_container(source, container, dataset, **options) for container in found}
+        return {container.id: scan_container(source, container, dataset, depth_sample_every) for container in found}
 
     return scan
 

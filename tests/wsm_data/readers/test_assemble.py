@@ -51,7 +51,24 @@ def test_the_digest_of_frames_goes_by_time_and_tells_colour_from_depth():
 def test_images_of_an_episode_without_a_table_make_it_known():
     folder = folder_of(np.eye(4), np.stack([np.eye(4)] * 5))
     folder.rgb[9, 0] = folder.rgb[4, 0]
-    assert episode_numbers(folder) == [4, 9]
+    assert episode_numbers(folder, in_trajectory=False, alone=True) == [4, 9]
     with pytest.raises(DataError) as caught:
         build_record(ID, "c", folder, 9, dataset_of("opengl"))
     assert caught.value.reason is Reason.TABLE_UNREADABLE
+
+
+@pytest.mark.parametrize(
+    ("in_trajectory", "alone", "expected"), [(False, True, [4, 5, 6]), (False, False, [4, 5, 6]), (True, True, [4])]
+)
+def test_episodes_that_are_only_named_are_known_in_scenes(in_trajectory, alone, expected):
+    folder = folder_of(np.eye(4), np.stack([np.eye(4)] * 5))
+    folder.lengths.update({6: 5, 5: 5})
+    assert episode_numbers(folder, in_trajectory=in_trajectory, alone=alone) == expected
+
+
+@pytest.mark.parametrize(
+    ("in_trajectory", "alone", "expected"), [(False, True, [5, 6]), (False, False, []), (True, True, [5])]
+)
+def test_a_folder_of_names_alone_speaks_for_itself_and_not_for_other_folders(in_trajectory, alone, expected):
+    folder = FolderContents(lengths={6: 5, 5: 5})
+    assert episode_numbers(folder, in_trajectory=in_trajectory, alone=alone) == expected

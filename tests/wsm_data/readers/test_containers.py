@@ -1,9 +1,22 @@
+import errno
 import os
 
 import pytest
 
 from wsm_data.errors import ConfigError
 from wsm_data.readers.containers import Layout, find_containers
+
+
+def refuse_listing(monkeypatch, name):
+    """As for a folder without permission; a superuser, who runs tests in containers, has them all."""
+    scandir = os.scandir
+
+    def refusing(path):
+        if os.fspath(path).endswith(f"/{name}"):
+            raise PermissionError(errno.EACCES, "Permission denied", os.fspath(path))
+        return scandir(path)
+
+    monkeypatch.setattr(os, "scandir", refusing)
 
 
 def find(source, dataset):
@@ -91,3 +104,76 @@ def test_the_signature_sees_sizes_and_names(build, tmp_path, dataset, change):
     else:
         info.unlink()
     assert find(tmp_path, dataset) != before
+
+
+@pytest.mark.parametrize(
+    ("link", "layout"),
+    [
+        ("group/scene.tar.gz", Layout.SCENE_ARCHIVE),
+        ("group/scene", Layout.SCENE_FOLDER),
+        ("group/scene/trajectory_01", Layout.TRAJECTORY_FOLDER),
+    ],
+)
+@pytest.mark.parametrize("target", ["gone", "itself"])
+def test_a_link_that_leads_nowhere_is_listed_and_not_passed_over(tmp_path, dataset, link, layout, target):
+    path = tmp_path / link
+    path.parent.mkdir(parents=True)
+    path.symlink_to(path if target == "itself" else tmp_path / "gone")
+    found = find(tmp_path, dataset)
+    assert [(id_, container.layout) for id_, container in found.items()] == [(link, layout)]
+
+
+@pytest.mark.parametrize("name", ["meta/more.json", "data", "videos/chunk-000/observation.images.rgb/9.jpg"])
+def test_a_link_that_leads_nowhere_is_signed_by_its_name(build, tmp_path, dataset, name):
+    files = build.trajectory_files(build.episode(0))
+    build.write_scene_folder(tmp_path, {file: data for file, data in files.items() if not file.startswith("data/")})
+    before = find(tmp_path, dataset)
+    link = tmp_path / "gibson_d435i/Acker.ville" / name
+    link.symlink_to(tmp_path / "gone")
+    broken = find(tmp_path, dataset)
+    assert broken != before
+    assert broken == find(tmp_path, dataset)
+    (tmp_path / "gone").write_bytes(b"back")
+    assert find(tmp_path, dataset) != broken
+
+
+@pytest.mark.parametrize(
+    ("name", "scene"),
+    [
+        ("scene.tar.gz.part", "scene"),
+        ("scene.tar.gz.incomplete", "scene"),
+        ("scene.tar.gz.aria2", "scene"),
+        ("Unconfirmed 7.crdownload", "Unconfirmed 7"),
+        ("sce.ne.tgz.PART", "sce.ne"),
+    ],
+)
+def test_an_unfinished_download_is_listed_and_not_passed_over(tmp_path, dataset, name, scene):
+    (tmp_path / "group").mkdir()
+    (tmp_path / "group" / name).write_bytes(b"")
+    (container,) = find_containers(tmp_path, dataset)
+    assert (container.id, container.scene, container.layout) == (f"group/{name}", scene, Layout.SCENE_ARCHIVE)
+
+
+def test_the_cloud_of_a_scene_is_signed_with_each_of_its_trajectories(build, tmp_path, dataset):
+    files = build.trajectory_files(build.episode(0), cloud="")
+    build.write_trajectories(tmp_path, {"trajectory_01": files, "trajectory_02": files})
+    before = find(tmp_path, dataset)
+    cloud = tmp_path / "gibson_d435i/Acker.ville/meta/pointcloud.ply"
+    cloud.parent.mkdir()
+    cloud.write_bytes(build.cloud())
+    after = find(tmp_path, dataset)
+    assert list(after) == list(before)
+    assert all(after[id_].signature != before[id_].signature for id_ in before)
+
+
+def test_a_group_that_cannot_be_listed_is_a_wrong_request(tmp_path, dataset, monkeypatch):
+    (tmp_path / "group" / "scene").mkdir(parents=True)
+    refuse_listing(monkeypatch, "group")
+    with pytest.raises(ConfigError, match="group: Permission denied"):
+        find_containers(tmp_path, dataset)
+
+
+def test_a_scene_that_cannot_be_listed_is_a_container_all_the_same(tmp_path, dataset, monkeypatch):
+    (tmp_path / "group" / "scene").mkdir(parents=True)
+    refuse_listing(monkeypatch, "scene")
+    assert list(find(tmp_path, dataset)) == ["group/scene"]

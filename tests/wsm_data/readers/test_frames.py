@@ -1,3 +1,7 @@
+import errno
+import os
+from pathlib import Path
+
 import pytest
 
 from wsm_data.errors import IntegrityError
@@ -13,7 +17,7 @@ def scene(request, build, tmp_path, dataset):
     write = build.write_archive if request.param == "archive" else build.write_scene_folder
     write(tmp_path, build.scene_files(episodes))
     (container,) = find_containers(tmp_path, dataset)
-    return episodes, container, scan_container(tmp_path, container, dataset).records, write
+    return episodes, container, scan_container(tmp_path, container, dataset, 10).records, write
 
 
 def test_frames_come_back_as_they_were_stored(scene, tmp_path):
@@ -37,7 +41,7 @@ def test_frames_of_trajectory_folders_and_of_unprefixed_scenes_come_too(build, t
     build.write_archive(tmp_path / "u", build.scene_files({0: build.episode(0), 1: episode}, prefixed=False))
     for source in (tmp_path / "t", tmp_path / "u"):
         (container,) = find_containers(source, dataset)
-        records = scan_container(source, container, dataset).records
+        records = scan_container(source, container, dataset, 10).records
         *_, (_, frames) = iter_episode_frames(source, container, records)
         assert frames.rgb == tuple(episode.rgb)
 
@@ -45,7 +49,7 @@ def test_frames_of_trajectory_folders_and_of_unprefixed_scenes_come_too(build, t
 def test_a_folder_is_read_lazily_and_in_the_order_asked_for(build, tmp_path, dataset):
     build.write_scene_folder(tmp_path, build.scene_files({n: build.episode(n) for n in range(3)}))
     (container,) = find_containers(tmp_path, dataset)
-    records = scan_container(tmp_path, container, dataset).records
+    records = scan_container(tmp_path, container, dataset, 10).records
     stream = iter_episode_frames(tmp_path, container, records[::-1])
     assert next(stream)[0].id.episode == "000002"
     (tmp_path / container.path / records[0].rgb_members[0]).unlink()
@@ -77,7 +81,7 @@ def test_a_source_that_changed_since_the_first_pass_is_noticed(scene, build, tmp
 def test_a_container_that_is_gone_is_noticed(build, tmp_path, dataset):
     path = build.write_archive(tmp_path, build.scene_files({0: build.episode(0)}))
     (container,) = find_containers(tmp_path, dataset)
-    records = scan_container(tmp_path, container, dataset).records
+    records = scan_container(tmp_path, container, dataset, 10).records
     path.unlink()
     with pytest.raises(IntegrityError):
         list(iter_episode_frames(tmp_path, container, records))
@@ -89,3 +93,17 @@ def test_a_record_of_another_container_is_a_callers_bug(scene, tmp_path, build, 
     (other,) = find_containers(tmp_path / "other", dataset)
     with pytest.raises(ValueError, match="not in"):
         list(iter_episode_frames(tmp_path / "other", other, records))
+
+
+@pytest.mark.parametrize("number", [errno.EACCES, errno.EIO])
+def test_an_image_that_can_no_longer_be_read_is_named(build, tmp_path, dataset, monkeypatch, number):
+    build.write_scene_folder(tmp_path, build.scene_files({0: build.episode(0)}))
+    (container,) = find_containers(tmp_path, dataset)
+    records = scan_container(tmp_path, container, dataset, 10).records
+
+    def failing(path):
+        raise OSError(number, os.strerror(number), str(path))
+
+    monkeypatch.setattr(Path, "read_bytes", failing)
+    with pytest.raises(IntegrityError, match=r"episode_000000_000\.jpg"):
+        list(iter_episode_frames(tmp_path, container, records))

@@ -1,9 +1,15 @@
 import gzip
+import io
+import tarfile
+import zipfile
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from zlib_ng import zlib_ng
 
+from wsm_data.errors import DataError, Reason
 from wsm_data.readers.gzip_stream import open_gzip
 
 CONTENT = np.arange(750_000, dtype=">u4").tobytes()
@@ -27,3 +33,74 @@ def test_taking_and_skipping_reads_the_content_in_order(tmp_path_factory, steps)
             position += size
             assert stream.position == position
         assert b"".join(bytes(piece) for piece in stream.rest()) == CONTENT[position:]
+
+
+def test_without_the_direct_reader_the_public_one_gives_the_same(tmp_path, monkeypatch):
+    path = tmp_path / "content.gz"
+    path.write_bytes(gzip.compress(CONTENT, 1))
+    monkeypatch.delattr(zlib_ng, "_GzipReader")
+    with open_gzip(path, "a") as stream:
+        stream.skip(1000)
+        assert stream.take(900_000) == CONTENT[1000:901_000]
+        assert b"".join(bytes(piece) for piece in stream.rest()) == CONTENT[901_000:]
+
+
+@pytest.mark.parametrize(
+    ("damage", "reason"),
+    [
+        (lambda data: data[:-9], Reason.ARCHIVE_TRUNCATED),
+        (lambda data: data[:-8] + bytes(8), Reason.ARCHIVE_CORRUPT),
+    ],
+)
+@pytest.mark.parametrize("direct", [True, False])
+def test_both_readers_refuse_damage_alike(tmp_path, monkeypatch, direct, damage, reason):
+    path = tmp_path / "content.gz"
+    path.write_bytes(damage(gzip.compress(CONTENT, 1)))
+    if not direct:
+        monkeypatch.delattr(zlib_ng, "_GzipReader")
+    with pytest.raises(DataError) as caught, open_gzip(path, "a") as stream:
+        list(stream.rest())
+    assert caught.value.reason is reason
+
+
+def zip_bytes():
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        archive.writestr("a/b", b"content")
+    return buffer.getvalue()
+
+
+def tar_bytes(mode):
+    buffer = io.BytesIO()
+    with tarfile.open(fileobj=buffer, mode=mode) as archive:
+        archive.addfile(tarfile.TarInfo("a/b"))
+    return buffer.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("data", "kind"),
+    [
+        (zip_bytes(), "zip"),
+        (tar_bytes("w"), "uncompressed tar"),
+        (tar_bytes("w:bz2"), "bzip2"),
+        (tar_bytes("w:xz"), "xz"),
+        (b"\x28\xb5\x2f\xfd rest", "Zstandard"),
+    ],
+)
+def test_another_kind_of_archive_is_to_be_packed_anew_and_not_downloaded_again(tmp_path, data, kind):
+    path = tmp_path / "a"
+    path.write_bytes(data)
+    with (
+        pytest.raises(DataError, match=f"is a {kind} archive: only .tar.gz archives are read") as caught,
+        open_gzip(path, "a"),
+    ):
+        pass
+    assert caught.value.reason is Reason.ARCHIVE_NOT_GZIP
+    assert "download it again" not in caught.value.message
+
+
+def test_what_is_no_archive_is_to_be_downloaded_again(tmp_path):
+    path = tmp_path / "a"
+    path.write_bytes(b"<html>not found</html>")
+    with pytest.raises(DataError, match="download it again"), open_gzip(path, "a"):
+        pass

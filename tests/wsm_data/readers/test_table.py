@@ -141,3 +141,30 @@ def test_a_mount_that_changes_within_an_episode_is_refused(build):
     mount[3, 2, 3] += 0.001
     assert reason_of(build.table(episode, mount=mount)) is Reason.MOUNT_MISFIT
     assert reason_of(build.table(episode, mount=episode.poses)) is Reason.MOUNT_MISFIT  # a trajectory is no mount
+
+
+@pytest.mark.parametrize("start", [0, 4711])
+def test_rows_may_be_counted_from_any_number(build, start):
+    episode = build.episode(0)
+    data = build.table(episode, index=np.arange(start, start + 7))
+    assert len(read_table(memoryview(data), "a").T_world_stored) == 7
+
+
+@pytest.mark.parametrize(
+    ("index", "row"), [([0, 1, 3, 2, 4, 5, 6], 2), ([0, 1, 2, 2, 3, 4, 5], 3), ([6, 5, 4, 3, 2, 1, 0], 1)]
+)
+def test_rows_that_do_not_count_up_by_one_are_refused_with_the_row(build, index, row):
+    data = build.table(build.episode(0), index=np.array(index))
+    with pytest.raises(DataError, match=rf"row {row} has {index[row]} after {index[row - 1]}") as caught:
+        read_table(memoryview(data), "a")
+    assert (caught.value.reason, caught.value.details["row"]) == (Reason.TABLE_ROW_ORDER, row)
+
+
+def test_a_table_without_an_index_is_taken_in_its_order(build):
+    episode = build.episode(0)
+    table = read_table(memoryview(build.table(episode, drop="index")), "a")
+    assert np.array_equal(table.T_world_stored, episode.poses.astype(np.float64))
+
+
+def test_an_index_that_is_no_number_is_refused(build):
+    assert reason_of(build.table(build.episode(0), index=np.array(list("abcdefg")))) is Reason.TABLE_BAD_SHAPE

@@ -1,0 +1,22 @@
+import errno
+
+import pytest
+
+from wsm_data.errors import DataError, Reason
+from wsm_data.readers.unreadable import refusing_unreadable
+
+
+@pytest.mark.parametrize("number", [errno.ENOENT, errno.EACCES, errno.EIO, errno.ESTALE, errno.ELOOP])
+def test_a_file_that_cannot_be_read_is_refused_by_name(number):
+    words = "the words of the system"
+    with pytest.raises(DataError, match=rf"scene:a\.jpg .*{words}") as caught, refusing_unreadable("scene:a.jpg"):
+        raise OSError(number, words)
+    assert caught.value.reason is Reason.FILE_UNREADABLE
+    assert caught.value.details == {"errno": number, "error": errno.errorcode[number]}
+
+
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EDQUOT, errno.EMFILE, errno.ENFILE, errno.ENOMEM])
+def test_what_the_machine_lacks_is_not_the_files_fault(number):
+    with pytest.raises(OSError, match="no more") as caught, refusing_unreadable("a"):
+        raise OSError(number, "no more")
+    assert caught.value.errno == number
