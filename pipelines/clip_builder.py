@@ -32,7 +32,7 @@ class Provenance:
 
     Attributes:
         dataset: the source's conventions.
-        map_digest: digest of the scene's surface.
+        map_digest: digest of the map level the trajectory lies on.
         map_from: `cloud` or `depth`.
         codec: name of the codec.
         codec_digest: digest of the codec.

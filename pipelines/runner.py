@@ -283,7 +283,7 @@ def _full_disk_named(folder: Path) -> Iterator[None]:
 
 
 def _is_finished(job: _Job) -> bool:
-    """Whether `finish` came to its end for these very outcomes and upstream states."""
+    """Whether `finish` came to its end for these very outcomes, upstream states and inputs of its own."""
     old = read_stage_record(job.out)
     return old is not None and old.finished == _state(job)
 
@@ -305,6 +305,7 @@ def _state(job: _Job) -> str:
             ),
             list(settled.pending),
             dict(job.record.seen),
+            dict(job.stage.finish_inputs(job.config)) if job.stage.finish_inputs else {},
         ]
     )
 

@@ -15,6 +15,8 @@ from wsm_data.files.typed_toml import build_config
 from wsm_data.readers.containers import Container, Layout
 from wsm_data.schema.dataset import DatasetManifest
 
+_ABOUT_THE_PUBLISHER = ("licence", "homepage", "expected_episodes")
+
 
 @dataclass(frozen=True, kw_only=True)
 class IndexedSource:
@@ -57,8 +59,12 @@ def _read_conventions(path: Path) -> DatasetManifest:
 
 
 def conventions_digest(dataset: DatasetManifest) -> str:
-    """Digest of everything a manifest says, so that a changed convention is a changed input."""
-    return digest_json(config_json(dataset))
+    """Digest of what a manifest says about the data, so that a changed convention is a changed input.
+
+    Licence, homepage and published counts change no byte of a record, a map or a clip: they are left out.
+    """
+    said = config_json(dataset)
+    return digest_json({name: value for name, value in said.items() if name not in _ABOUT_THE_PUBLISHER})
 
 
 def container_json(container: Container) -> dict[str, Any]:

@@ -93,6 +93,8 @@ class Stage(Generic[ConfigT]):
             units that have none yet.
         finish: called once all selected units are settled and something changed since it was last called; writes what
             belongs to no single unit and returns refusals that only the whole can know. None where there is nothing.
+        finish_inputs: digest of each input that `finish` alone reads, by name; a changed one has it called again
+            although no unit is redone. None where there is none.
     """
 
     name: str
@@ -101,6 +103,7 @@ class Stage(Generic[ConfigT]):
     list_units: Callable[[ConfigT], Sequence[Unit]]
     process: Callable[[Sequence[Unit], ConfigT, StageContext], Iterator[Outcome]]
     finish: Callable[[ConfigT, StageContext, Settled], Sequence[Refusal]] | None = None
+    finish_inputs: Callable[[ConfigT], Mapping[str, str]] | None = None
 
 
 def refused(unit: Unit, error: DataError) -> Outcome:

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +17,11 @@ from pipelines.source import IndexedSource, container_from_json, conventions_dig
 from pipelines.stage import Outcome, Settled, Stage, StageContext, Unit, refused
 from pipelines.upstream import done_outcomes, quarantine_of, require_stage
 from wsm_data.codecs.base import VideoCodec
-from wsm_data.codecs.registry import CodecConfig, make_codec
-from wsm_data.errors import DataError
+from wsm_data.codecs.registry import CodecConfig, describe_codec, make_codec
+from wsm_data.errors import ConfigError, DataError
 from wsm_data.files.atomic import write_text
 from wsm_data.files.digest import sha256_bytes
-from wsm_data.files.typed_toml import INPUT
+from wsm_data.files.typed_toml import INPUT, SELECTION
 from wsm_data.maps.scene_map import SceneMap, floor_levels, load_scene_map
 from wsm_data.readers.containers import Container
 from wsm_data.readers.frames import iter_episode_frames
@@ -40,14 +41,15 @@ class EncodeConfig:
         map: folder of `wsm map`.
         clip: what a clip holds.
         codec: which codec encodes.
-        quality_share: share of the clips, chosen by a hash of their ids, that are decoded again to measure the codec.
+        quality_share: share of the clips, chosen by a hash of their ids, that are decoded again, when they are encoded,
+            to measure the codec. Not a setting of the bytes of a clip.
     """
 
     index: Path = field(metadata=INPUT)
     map: Path = field(metadata=INPUT)
     clip: ClipConfig = field(default_factory=ClipConfig)
     codec: CodecConfig = field(default_factory=CodecConfig)
-    quality_share: float = 0.05
+    quality_share: float = field(default=0.05, metadata=SELECTION)
 
     def __post_init__(self) -> None:
         if not 0 <= self.quality_share <= 1:
@@ -75,7 +77,7 @@ class _Prepared:
 def _list_units(config: EncodeConfig) -> Sequence[Unit]:
     require_stage(config.map, "map")
     source = indexed_source(config.index)
-    codec = make_codec(config.codec).describe().digest
+    codec = describe_codec(config.codec).digest
     conventions = conventions_digest(source.dataset)
     containers = done_outcomes(config.index)
     maps = done_outcomes(config.map)
@@ -94,8 +96,7 @@ def _list_units(config: EncodeConfig) -> Sequence[Unit]:
         else:
             continue  # its map is pending, and so is the trajectory
         inputs = {
-            "trajectory": row.digest,
-            "notes": ",".join(row.notes),  # a clip holds them, and they are no part of a trajectory's content
+            "trajectory": row.record_digest,
             "map": map_digest,
             "codec": codec,
             "dataset": conventions,
@@ -118,7 +119,7 @@ def _process(batch: Sequence[Unit], config: EncodeConfig, context: StageContext)
             yield refused(unit, DataError(scene.reason, message, scene.details))
         return
     source = indexed_source(config.index)
-    codec = make_codec(config.codec)
+    codec = _loaded_codec(config.codec, batch[0].inputs["codec"])
     scene_map = load_scene_map(map_path(config.map, scene.container.id))
     waiting: list[_Prepared] = []
     for prepared in _prepare(batch, scene, source, scene_map, config):
@@ -130,6 +131,15 @@ def _process(batch: Sequence[Unit], config: EncodeConfig, context: StageContext)
             yield from _encode(waiting, scene, source, codec, config, context.out)
             waiting = []
     yield from _encode(waiting, scene, source, codec, config, context.out)
+
+
+@lru_cache(maxsize=1)
+def _loaded_codec(config: CodecConfig, digest: str) -> VideoCodec:
+    """The codec of the units, loaded once in a process; the digest tells when files in its folder were replaced."""
+    codec = make_codec(config)
+    if codec.describe().digest != digest:
+        raise ConfigError(f"the weights in {config.weights} were changed while the stage ran; run `wsm encode` again")
+    return codec
 
 
 def _prepare(
@@ -204,10 +214,10 @@ def _quality(
 def _finish(config: EncodeConfig, context: StageContext, settled: Settled) -> Sequence[Refusal]:
     """Write what the codec says of itself beside the clips, for the release."""
     del settled
-    write_text(codec_path(context.out), json.dumps(asdict(make_codec(config.codec).describe()), indent=2) + "\n")
+    write_text(codec_path(context.out), json.dumps(asdict(describe_codec(config.codec)), indent=2) + "\n")
     return ()
 
 
 STAGE = Stage(
-    name="encode", version=1, config_type=EncodeConfig, list_units=_list_units, process=_process, finish=_finish
+    name="encode", version=2, config_type=EncodeConfig, list_units=_list_units, process=_process, finish=_finish
 )

@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from pipelines.config import config_json
 from pipelines.depth_fusion import fused_points
-from pipelines.episode_table import row_from_json, write_episodes
+from pipelines.episode_table import record_digest, row_from_json, write_episodes
 from pipelines.folder import refusal_json
 from pipelines.layout import records_path, surface_path
 from pipelines.source import container_json, conventions_digest, write_conventions
@@ -144,9 +145,9 @@ def _row(record: EpisodeRecord) -> dict[str, Any]:
         "id": record.id.text,
         "container": record.container,
         "digest": record.content_digest,
+        "record_digest": record_digest(record),
         "frames": record.frame_count,
         "floor_z_m": record.floor_z_m,
-        "notes": list(record.notes),
     }
 
 
@@ -169,6 +170,11 @@ def _finish(config: IndexConfig, context: StageContext, settled: Settled) -> Seq
         for line in count_differences(found, dataset.expected_episodes):
             _LOG.warning("%s", line)
     return refusals
+
+
+def _finish_inputs(config: IndexConfig) -> Mapping[str, str]:
+    """What the manifest says beside the conventions, its licence above all, is written down without reading again."""
+    return {"manifest": digest_json(config_json(load_dataset(config.dataset)))}
 
 
 def count_differences(found: Mapping[str, int], expected: Mapping[str, int]) -> list[str]:
@@ -203,9 +209,10 @@ def _duplicate(container: str, row: Mapping[str, Any], kept: Mapping[str, Any]) 
 
 STAGE = Stage(
     name="index",
-    version=1,
+    version=2,
     config_type=IndexConfig,
     list_units=_list_units,
     process=_process,
     finish=_finish,
+    finish_inputs=_finish_inputs,
 )

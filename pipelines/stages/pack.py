@@ -138,13 +138,10 @@ def _finish(config: PackConfig, context: StageContext, settled: Settled) -> Sequ
 def _facts(config: PackConfig, clips: Mapping[str, Outcome]) -> ReleaseFacts:
     records = {name: require_stage(getattr(config, name), name) for name in ("index", "split", "map", "encode")}
     clip_settings: Mapping[str, Any] = records["encode"].settings["clip"]
-    codec = json.loads(codec_path(config.encode).read_text())
     dataset = indexed_source(config.index).dataset
     return ReleaseFacts(
         name=config.name,
-        codec=CodecInfo(
-            **{**codec, "latent_mean": tuple(codec["latent_mean"]), "latent_std": tuple(codec["latent_std"])}
-        ),
+        codec=CodecInfo.from_json(json.loads(codec_path(config.encode).read_text())),
         depth_range=DepthRange(**clip_settings["depth_range"]),
         encoded_width_px=clip_settings["width"],
         encoded_height_px=clip_settings["height"],
@@ -156,7 +153,7 @@ def _facts(config: PackConfig, clips: Mapping[str, Outcome]) -> ReleaseFacts:
 
 
 def _quality(clips: Mapping[str, Outcome]) -> dict[str, Any]:
-    """Merged quality of the clips on which it was measured, in the order of their ids; empty where none was."""
+    """Merged quality of the clips on which it was measured when they were encoded; empty where none was."""
     measured = [outcome.facts["quality"] for _, outcome in sorted(clips.items()) if outcome.facts["quality"]]
     merged: CodecQuality | None = None
     for record in measured:

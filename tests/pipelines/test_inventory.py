@@ -39,7 +39,14 @@ class Stages:
 
     def indexed(self, accepted=(), refused=(), pending=()):
         rows = [
-            EpisodeRow(id=EpisodeId.parse(name), container=source, digest=f"content of {name}", frames=5, floor_z_m=0.0)
+            EpisodeRow(
+                id=EpisodeId.parse(name),
+                container=source,
+                digest=f"content of {name}",
+                record_digest="r",
+                frames=5,
+                floor_z_m=0.0,
+            )
             for name, source in accepted
         ]
         write_episodes(self.index, rows)

@@ -28,7 +28,7 @@ class VideoCodec(Protocol):
         """
 
     def encode_many(self, videos: Sequence[Float32Array]) -> list[Float32Array]:
-        """Latents of several videos, equal to encoding each alone; a codec on a GPU batches them."""
+        """Latents of several videos; a codec that batches them agrees with `encode` to the rounding of its dtype."""
 
     def decode(self, latents: Float32Array) -> Float32Array:
         """Video of latents [F, C, h, w], float32 [1 + 4 (F - 1), H, W, 3], clamped to [-1, 1]."""

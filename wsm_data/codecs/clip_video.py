@@ -84,10 +84,8 @@ def depth_video(
     return _three_channels(channel), valid
 
 
-def padded_length(frames: int, still_frames: int = 16) -> int:
+def padded_length(frames: int, still_frames: int) -> int:
     """Length of a clip of `frames` raw frames: the next 1 + 4k, then `still_frames` more.
-
-    The paper is silent about tails; with K M = 16 still frames staying at the goal is learned.
 
     Raises:
         ValueError: there is no frame, or `still_frames` is not a whole number of latents.

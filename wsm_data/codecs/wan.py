@@ -55,23 +55,24 @@ class WanCodec:
     Attributes:
         vae: the network, in evaluation mode, on its device and in its dtype.
         info: geometry and identity.
-        batch_clips: clips encoded at once.
+        batch_videos: videos encoded at once.
     """
 
     vae: AutoencoderKLWan
     info: CodecInfo
-    batch_clips: int = 1
+    batch_videos: int = 1
 
     def encode(self, video: Float32Array) -> Float32Array:
         """See `VideoCodec.encode`: the mode of the posterior, never a sample."""
         return self.encode_many([video])[0]
 
     def encode_many(self, videos: Sequence[Float32Array]) -> list[Float32Array]:
-        """See `VideoCodec.encode_many`. Clips of similar length share a batch; results stand in the order of `videos`.
+        """See `VideoCodec.encode_many`. Similar lengths share a batch; results stand in the order of `videos`.
 
-        Shorter clips are padded with repeats of their last frame and their latents cropped again: the encoder is
-        causal, so what follows a clip does not reach it. Kernels may round differently in batches of another size, so
-        across `batch_clips` latents agree to the rounding of the dtype, not to the bit.
+        Shorter videos are padded with repeats of their last frame and their latents cropped again: the encoder is
+        causal, so what follows a video does not reach it. Kernels may round differently in batches of another size or
+        length, so across batches latents agree to the rounding of the dtype, not to the bit. Equally long videos that
+        follow one another stay together, so with `batch_videos` = 2 and pairs of videos every batch is a pair.
 
         Raises:
             ValueError: a length is not 1 + 4k, a side not a multiple of 32, or the sizes differ.
@@ -82,15 +83,15 @@ class WanCodec:
             raise ValueError(f"videos of one call must have one size, found {[video.shape[1:3] for video in videos]}")
         longest_first = sorted(range(len(videos)), key=lambda i: -len(videos[i]))
         latents: dict[int, Float32Array] = {}
-        for start in range(0, len(videos), self.batch_clips):
-            members = longest_first[start : start + self.batch_clips]
+        for start in range(0, len(videos), self.batch_videos):
+            members = longest_first[start : start + self.batch_videos]
             batch = self._encode_batch([videos[i] for i in members])
             for i, encoded in zip(members, batch, strict=True):
                 latents[i] = encoded[: 1 + (len(videos[i]) - 1) // self.info.temporal_ratio]
         return [latents[i] for i in range(len(videos))]
 
     def _encode_batch(self, videos: Sequence[Float32Array]) -> Float32Array:
-        """Latents [N, F, C, h, w] of N clips, padded to the longest."""
+        """Latents [N, F, C, h, w] of N videos, padded to the longest."""
         longest = max(len(video) for video in videos)
         padded = np.stack([pad_frames(video, longest) for video in videos])
         with torch.inference_mode():
@@ -111,31 +112,46 @@ class WanCodec:
         return self.info
 
 
-def load_wan_codec(weights: str, *, dtype: str = "float32", device: str = "auto", batch_clips: int = 1) -> WanCodec:
+def load_wan_codec(weights: str, *, dtype: str = "float32", device: str = "auto", batch_videos: int = 1) -> WanCodec:
     """Load the VAE from a local folder.
 
     Args:
         weights: folder with config.json and the safetensors.
         dtype: `float32` or `bfloat16`, for preparation and inference alike.
         device: `cpu`, `cuda`, or `auto`.
-        batch_clips: clips encoded at once.
+        batch_videos: videos encoded at once.
 
     Raises:
         ConfigError: the folder lacks files, the geometry or the tensors are not those of the Wan2.2 VAE, or dtype or
             device are not to be had.
     """
+    on = _pick_device(device)
+    folder = _weights_folder(weights, dtype)
+    config, files = _read_config(folder), _weight_files(folder)
+    with torch.device("meta"):  # no memory and no random numbers for tensors that are replaced at once
+        vae = AutoencoderKLWan(**config)
+    _load_tensors(vae, files, folder)
+    vae.to(on, _DTYPES[dtype]).eval().requires_grad_(False)
+    return WanCodec(vae=vae, info=_describe(config, files, dtype), batch_videos=batch_videos)
+
+
+def describe_wan_codec(weights: str, *, dtype: str = "float32", device: str = "auto") -> CodecInfo:
+    """What `load_wan_codec` would say of itself, without building the network: files are hashed, not loaded.
+
+    Raises:
+        ConfigError: as `load_wan_codec`, except that the tensors are not looked at.
+    """
+    _pick_device(device)
+    folder = _weights_folder(weights, dtype)
+    return _describe(_read_config(folder), _weight_files(folder), dtype)
+
+
+def _weights_folder(weights: str, dtype: str) -> Path:
     if dtype not in _DTYPES:
         raise ConfigError(f"codec.dtype of wan must be one of {', '.join(_DTYPES)}, found {dtype!r}")
     if not weights:
         raise ConfigError("codec wan needs codec.weights, the local folder of the Wan2.2 VAE in the diffusers layout")
-    folder = Path(weights)
-    config = _read_config(folder)
-    files = _weight_files(folder)
-    with torch.device("meta"):  # no memory and no random numbers for tensors that are replaced at once
-        vae = AutoencoderKLWan(**config)
-    _load_tensors(vae, files, folder)
-    vae.to(_pick_device(device), _DTYPES[dtype]).eval().requires_grad_(False)
-    return WanCodec(vae=vae, info=_describe(config, files, dtype), batch_clips=batch_clips)
+    return Path(weights)
 
 
 def _read_config(folder: Path) -> dict[str, Any]:

@@ -24,7 +24,7 @@ class ClipMeta:
         id: the trajectory.
         dataset: name of the source's manifest.
         source_digest: content digest of the trajectory, the same in every layout it can be stored in.
-        map_digest: digest of the scene map that was cropped.
+        map_digest: digest of the level of the scene map that was cropped: its floor, and what stands on it.
         intrinsics: camera at the encoded size.
         T_world_camera0: first camera to world; 4 x 4 nested tuples, m.
         goal_world_m: last camera position in the world, m.

@@ -132,12 +132,9 @@ def parse_manifest(data: bytes, where: str) -> ReleaseManifest:
 
 
 def _from_json(record: Mapping[str, Any]) -> ReleaseManifest:
-    codec = dict(record["codec"])
-    for name in ("latent_mean", "latent_std"):
-        codec[name] = tuple(codec[name])
     parsed = {
         "shards": tuple(ShardInfo(**shard) for shard in record["shards"]),
-        "codec": CodecInfo(**codec),
+        "codec": CodecInfo.from_json(record["codec"]),
         "rgb_statistics": _statistics(record["rgb_statistics"]),
         "depth_statistics": _statistics(record["depth_statistics"]),
         "depth_range": DepthRange(**record["depth_range"]),

@@ -18,9 +18,10 @@ from box_room import (
 )
 
 from pipelines.clip_config import ClipConfig
+from pipelines.episode_table import read_episodes
 from pipelines.folder import read_stage_record
 from pipelines.layout import clips_folder, codec_path
-from pipelines.stages import encode
+from pipelines.stages import encode, index
 from wsm_data.codecs.dct import DctCodec
 from wsm_data.codecs.quality import CodecQuality
 from wsm_data.codecs.registry import CodecConfig
@@ -72,7 +73,7 @@ def test_every_accepted_trajectory_is_a_unit_and_those_of_a_container_share_a_pa
     units = mapped.units("encode")
     assert list(units) == UNITS
     assert {(unit.batch, unit.source) for unit in units.values()} == {(one, one) for one in (DEN, HALL, ZED)}
-    assert set(units[UNITS[0]].inputs) == {"trajectory", "notes", "map", "codec", "dataset"}
+    assert set(units[UNITS[0]].inputs) == {"trajectory", "map", "codec", "dataset"}
 
 
 def test_a_changed_image_changes_its_own_trajectory_alone(mapped, changed):
@@ -119,27 +120,76 @@ def test_furniture_that_is_moved_upstairs_changes_what_is_upstairs(mapped, chang
 def test_another_codec_changes_every_trajectory(mapped, changed, monkeypatch):
     before = mapped.inputs("encode")
 
-    class Other(DctCodec):
-        def describe(self):
-            return replace(super().describe(), digest="other")
-
-    monkeypatch.setattr(encode, "make_codec", lambda config: Other())
+    monkeypatch.setattr(encode, "describe_codec", lambda config: replace(DctCodec().describe(), digest="other"))
     assert changed(before, mapped.inputs("encode")) == {unit: {"codec"} for unit in UNITS}
 
 
 def test_a_changed_convention_changes_every_trajectory(mapped, changed):
     before = mapped.inputs("encode")
-    mapped.set_manifest('homepage = "elsewhere"\n' + MANIFEST_TOML)
+    mapped.set_manifest("max_pitch_deg = 44.0\n" + MANIFEST_TOML)
     again(mapped)
     assert changed(before, mapped.inputs("encode")) == {unit: {"dataset"} for unit in UNITS}
 
 
+def test_a_changed_licence_changes_no_trajectory(mapped, changed):
+    mapped.run("encode")
+    before = mapped.inputs("encode")
+    mapped.set_manifest(MANIFEST_TOML.replace("Apache-2.0", "CC0"))
+    again(mapped)
+    assert changed(before, mapped.inputs("encode")) == {}
+    assert mapped.run("encode").ran == ()
+
+
+def test_a_reader_that_converts_otherwise_makes_every_clip_anew(mapped, changed, monkeypatch):
+    """What is stored is the same; its content digest cannot tell."""
+    mapped.run("encode")
+    before, clips = mapped.inputs("encode"), clip_digests(mapped)
+    scan_as_before = index.scan_container
+
+    def scan(*arguments):
+        found = scan_as_before(*arguments)
+        return replace(
+            found, records=[replace(one, camera_pitch_rad=one.camera_pitch_rad + 1e-9) for one in found.records]
+        )
+
+    monkeypatch.setattr(index, "scan_container", scan)
+    shutil.rmtree(mapped.folder("index"))
+    again(mapped)
+    assert changed(before, mapped.inputs("encode")) == {unit: {"trajectory"} for unit in UNITS}
+    assert set(mapped.run("encode").ran) == set(UNITS)
+    after = clip_digests(mapped)
+    assert [name for name in clips if after[name] == clips[name]] == []
+
+
+def test_a_codec_is_loaded_once_in_a_process_and_only_described_elsewhere(mapped, monkeypatch):
+    loaded = []
+
+    def make(config):
+        loaded.append(config)
+        return DctCodec()
+
+    monkeypatch.setattr(encode, "make_codec", make)
+    encode._loaded_codec.cache_clear()
+    mapped.run("encode")  # three containers
+    assert loaded == [CodecConfig()]
+    shutil.rmtree(mapped.folder("encode"))
+    mapped.run("encode")
+    assert loaded == [CodecConfig()]
+
+
+def test_weights_that_were_changed_while_the_stage_ran_are_refused(mapped, monkeypatch):
+    listed = replace(DctCodec().describe(), digest="other")
+    monkeypatch.setattr(encode, "describe_codec", lambda config: listed)
+    with pytest.raises(ConfigError, match="were changed while the stage ran; run `wsm encode` again"):
+        mapped.run("encode")
+
+
 def test_a_note_that_comes_or_goes_changes_its_trajectory(mapped, changed):
-    """The clip holds the note, and neither images, poses nor map tell of it."""
+    """The clip holds the note, and neither images, poses nor map tell of it, but the record does."""
     before = mapped.inputs("encode")
     (mapped.source / HALL / "meta/episodes.jsonl").write_bytes(lengths_bytes({0: 7, 1: 14, 2: 7}))
     again(mapped)
-    assert changed(before, mapped.inputs("encode")) == {f"{HALL}/000001": {"notes"}}
+    assert changed(before, mapped.inputs("encode")) == {f"{HALL}/000001": {"trajectory"}}
 
 
 def test_the_layout_is_no_input_and_the_clips_are_the_same(make_pipeline, changed):
@@ -151,9 +201,9 @@ def test_the_layout_is_no_input_and_the_clips_are_the_same(make_pipeline, change
     again(pipeline)
     assert changed(before, pipeline.inputs("encode")) == {}
     assert pipeline.run("encode").ran == ()
-    pipeline.run("encode", options={"fork": True}, quality_share=0.5)
-    (forked,) = [path for path in pipeline.run_folder.iterdir() if path.name.startswith("encode-")]
-    assert {name: sha256_file(clips_folder(forked) / name) for name in clips} == clips
+    shutil.rmtree(pipeline.folder("encode"))
+    pipeline.run("encode")
+    assert clip_digests(pipeline) == clips
 
 
 def test_a_trajectory_whose_map_is_pending_is_not_listed_yet(make_pipeline):
@@ -202,10 +252,11 @@ def test_the_outputs_of_a_trajectory_are_its_clip_and_what_vouches_for_it(finish
 
 
 def test_a_clip_knows_the_map_and_the_codec_it_was_made_with(finished):
+    content = {row.id.text: row.digest for row in read_episodes(finished.folder("index"))}
     for name, unit in finished.units("encode").items():
         path = fragment_path(clips_folder(finished.folder("encode")), EpisodeId.parse(name).key)
         meta = read_fragment_info(path).meta
-        assert meta.source_digest == unit.inputs["trajectory"]
+        assert meta.source_digest == content[name]
         assert meta.map_digest == unit.inputs["map"]
         assert meta.codec_digest == unit.inputs["codec"] == DctCodec().describe().digest
         assert (meta.map_from, meta.notes) == (("depth", ("cloud.missing",)) if DEN in name else ("cloud", ()))
@@ -217,15 +268,36 @@ def test_the_codec_describes_itself_beside_the_clips(finished):
     assert stored == json.loads(json.dumps(asdict(DctCodec().describe())))
 
 
-def test_batches_of_clips_make_the_work_faster_and_nothing_else(mapped, changed):
+def test_batches_of_clips_are_a_setting_and_the_built_in_codec_does_not_know_them(mapped):
     mapped.run("encode")
-    clips, inputs = clip_digests(mapped), mapped.inputs("encode")
+    clips = clip_digests(mapped)
     batched = {"codec": CodecConfig(batch_clips=2)}
-    assert changed(inputs, mapped.inputs("encode", **batched)) == {}
-    assert mapped.run("encode", **batched).ran == ()
+    with pytest.raises(ConfigError, match=r"codec\.batch_clips: 1 -> 2"):
+        mapped.run("encode", **batched)
     shutil.rmtree(mapped.folder("encode"))
     mapped.run("encode", **batched)  # three clips of the hall: a full batch, and one that is not
     assert clip_digests(mapped) == clips
+
+
+def test_a_codec_is_given_the_two_videos_of_one_clip_at_a_time(mapped, monkeypatch):
+    calls = []
+
+    class Watched(DctCodec):
+        def encode_many(self, videos):
+            calls.append([len(video) for video in videos])
+            return super().encode_many(videos)
+
+    monkeypatch.setattr(encode, "make_codec", lambda config: Watched())
+    encode._loaded_codec.cache_clear()
+    mapped.run("encode")
+    encode._loaded_codec.cache_clear()
+    assert [len(lengths) for lengths in calls if lengths] == [2] * len(UNITS)
+    assert all(len(set(lengths)) <= 1 for lengths in calls)
+
+
+def test_another_share_of_measured_clips_makes_no_clip_anew(mapped):
+    mapped.run("encode")
+    assert mapped.run("encode", quality_share=0.0).ran == ()
 
 
 def test_the_share_of_measured_clips_depends_on_their_ids_alone_and_grows_with_it(mapped):

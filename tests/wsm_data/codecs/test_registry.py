@@ -4,8 +4,9 @@ import sys
 import pytest
 
 from wsm_data.codecs.dct import DctCodec
-from wsm_data.codecs.registry import CodecConfig, make_codec
+from wsm_data.codecs.registry import CodecConfig, describe_codec, make_codec
 from wsm_data.errors import ConfigError
+from wsm_data.files.typed_toml import build_config
 
 
 def test_the_default_is_the_built_in_codec():
@@ -27,13 +28,21 @@ def test_settings_that_the_built_in_codec_cannot_honour_are_refused(setting):
 
 
 def test_a_batch_of_no_clips_is_refused():
-    with pytest.raises(ConfigError, match="batch_clips"):
+    with pytest.raises(ValueError, match="batch_clips must be at least 1, found 0"):
         CodecConfig(batch_clips=0)
+    with pytest.raises(ConfigError, match=r"encode\.codec: batch_clips must be"):
+        build_config(CodecConfig, {"batch_clips": 0}, "encode.codec")
 
 
-def test_speed_settings_do_not_change_the_digest():
+def test_device_and_batches_do_not_change_the_digest():
     plain = make_codec(CodecConfig()).describe().digest
     assert make_codec(CodecConfig(device="cpu", batch_clips=8)).describe().digest == plain
+
+
+def test_a_codec_is_described_as_it_describes_itself():
+    assert describe_codec(CodecConfig()) == make_codec(CodecConfig()).describe()
+    with pytest.raises(ConfigError, match=r"did you mean dct\?"):
+        describe_codec(CodecConfig(name="dtc"))
 
 
 def test_settings_are_read_without_torch_numba_or_opencv():
@@ -50,3 +59,5 @@ def test_wan_without_its_packages_names_the_extra(monkeypatch):
     monkeypatch.delitem(sys.modules, "wsm_data.codecs.wan", raising=False)
     with pytest.raises(ConfigError, match=r"pip install 'wsm\[wan\]'"):
         make_codec(CodecConfig(name="wan", weights="folder"))
+    with pytest.raises(ConfigError, match=r"pip install 'wsm\[wan\]'"):
+        describe_codec(CodecConfig(name="wan", weights="folder"))

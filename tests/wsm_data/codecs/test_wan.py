@@ -4,7 +4,7 @@ import shutil
 import numpy as np
 import pytest
 
-from wsm_data.codecs.registry import CodecConfig, make_codec
+from wsm_data.codecs.registry import CodecConfig, describe_codec, make_codec
 from wsm_data.errors import ConfigError
 
 torch = pytest.importorskip("torch")
@@ -86,6 +86,31 @@ def test_a_batch_of_unequal_clips_equals_each_alone(weights, noise_video, dtype)
         for one, other in zip(alone, together, strict=True):
             assert one.shape == other.shape
             np.testing.assert_allclose(one, other, atol=TOLERANCE[dtype])
+
+
+@pytest.mark.parametrize("dtype", ["float32", "bfloat16"])
+def test_by_default_the_latents_of_a_clip_do_not_depend_on_what_else_is_encoded(weights, noise_video, dtype):
+    codec = load(weights, dtype=dtype)
+    depth = np.broadcast_to(noise_video[..., :1], noise_video.shape)
+    pairs = [(noise_video[:5], depth[:5]), (noise_video, depth), (noise_video[4:9], depth[4:9])]
+    together = codec.encode_many([video for pair in pairs for video in pair])
+    for number, pair in enumerate(pairs):
+        for one, other in zip(codec.encode_many(pair), together[2 * number : 2 * number + 2], strict=True):
+            assert np.array_equal(one, other)
+
+
+def test_colour_and_depth_of_a_clip_are_one_batch(weights, noise_video, monkeypatch):
+    codec, sizes = load(weights), []
+    encode = codec.vae.encode
+    monkeypatch.setattr(codec.vae, "encode", lambda x: sizes.append(tuple(x.shape[:3])) or encode(x))
+    codec.encode_many([noise_video[:5], noise_video[:5], noise_video, noise_video])
+    assert sizes == [(2, 3, 9), (2, 3, 5)]
+
+
+def test_a_description_needs_no_network(weights, monkeypatch):
+    wanted = load(weights).describe()
+    monkeypatch.setattr("wsm_data.codecs.wan.AutoencoderKLWan.load_state_dict", None)
+    assert describe_codec(CodecConfig(name="wan", weights=str(weights), device="cpu")) == wanted
 
 
 def test_the_tolerance_of_batches_tells_clips_apart(codec, noise_video):
