@@ -23,6 +23,8 @@ class ClipConfig:
         still_frames: repeats of the last frame after the end, so that staying is learned; paper silent, K M = 16.
         goal_radius_m: radius r_g of the goal region, m (table 5).
         map_margin_m: the map crop reaches this far beyond path and goal, m; paper silent.
+        fill_holes_cells: gaps of so many unknown cells between free ones are free, see `maps.holes`; paper silent, 0:
+            unknown is unknown.
     """
 
     width: int = 320
@@ -31,6 +33,7 @@ class ClipConfig:
     still_frames: int = 16
     goal_radius_m: float = 0.2
     map_margin_m: float = 2.0
+    fill_holes_cells: int = 0
 
     def __post_init__(self) -> None:
         if min(self.width, self.height) <= 0 or self.width % SIDE_MULTIPLE_PX or self.height % SIDE_MULTIPLE_PX:
@@ -46,3 +49,5 @@ class ClipConfig:
             )
         if self.map_margin_m < 0:
             raise ValueError(f"map_margin_m must not be negative, found {self.map_margin_m}")
+        if self.fill_holes_cells < 0:
+            raise ValueError(f"fill_holes_cells must not be negative, found {self.fill_holes_cells}")

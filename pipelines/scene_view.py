@@ -12,6 +12,7 @@ from wsm_data.errors import DataError, Reason
 from wsm_data.maps.crop import crop_around, free_swept_cells
 from wsm_data.maps.footprint import clearance_m
 from wsm_data.maps.geodesic import geodesic_distance
+from wsm_data.maps.holes import fill_holes
 from wsm_data.maps.occupancy import occupancy_for
 from wsm_data.maps.progress import sample_distance
 from wsm_data.maps.scene_map import MAX_MAP_CELLS, SceneMap
@@ -29,7 +30,7 @@ class SceneView:
         occupancy: crop of the map around path and goal.
         geodesic_m: geodesic distance to the goal region on the crop, m; float32 [Y, X].
         distance_m: geodesic distance of every camera position, m; float64 [T].
-        freed_cells: unknown cells that the expert's footprint swept.
+        freed_cells: unknown cells that became free: those the expert's footprint swept, and the holes filled before.
     """
 
     occupancy: OccupancyGrid
@@ -39,7 +40,7 @@ class SceneView:
 
 
 def view_scene(record: EpisodeRecord, scene_map: SceneMap, dataset: DatasetManifest, config: ClipConfig) -> SceneView:
-    """Cut the map for this robot, free what it swept, and measure distances to the goal.
+    """Cut the map for this robot, fill its holes, free what the robot swept, and measure distances to the goal.
 
     Distances are measured on the whole floor and cropped afterwards: a detour may lead through rooms that the crop
     leaves out.
@@ -50,6 +51,7 @@ def view_scene(record: EpisodeRecord, scene_map: SceneMap, dataset: DatasetManif
     path_xy_m, radius_m = record.path_xy_m, dataset.robot.radius_m
     floor = occupancy_for(scene_map, record.floor_z_m, record.camera_height_m, dataset.robot)
     floor = _around_path(floor, path_xy_m, config.map_margin_m, record.id.text)
+    floor, filled = fill_holes(floor, config.fill_holes_cells)
     floor, freed = free_swept_cells(floor, path_xy_m, radius_m)
     require_kept(check_expert_path(clearance_m(floor, path_xy_m), record.id.text))
     geodesic_m = geodesic_distance(floor, path_xy_m[-1], radius_m, config.goal_radius_m)
@@ -62,7 +64,7 @@ def view_scene(record: EpisodeRecord, scene_map: SceneMap, dataset: DatasetManif
         occupancy=crop,
         geodesic_m=geodesic_m[row : row + height, column : column + width],
         distance_m=distance_m,
-        freed_cells=freed,
+        freed_cells=filled + freed,
     )
 
 

@@ -25,6 +25,7 @@ def test_the_defaults_are_the_papers():
         ({"still_frames": -4}, "a multiple of 4, found -4"),
         ({"goal_radius_m": 0.05}, "at least 0.071 m, the diagonal of a map cell, found 0.05"),
         ({"map_margin_m": -0.1}, "must not be negative, found -0.1"),
+        ({"fill_holes_cells": -1}, "fill_holes_cells must not be negative, found -1"),
         ({"depth_range": {"min_m": 5.0}}, "0 < min_m < max_m, found 5.0 and 5.0"),
     ],
 )

@@ -140,6 +140,18 @@ def test_unknown_cells_under_the_robot_are_freed_and_counted_and_others_stay_unk
     assert np.isfinite(view.geodesic_m[swept]).all()
 
 
+def test_holes_are_filled_where_that_is_asked_for_and_counted_with_the_swept_cells():
+    drive = along_x()
+    column = np.float32([3.075, 2.325])  # one cell of the floor, seen by nobody and swept by nobody
+    scene = scene_map([HALL], [drive], keep=lambda xyz: np.abs(xyz[:, :2] - column).max(axis=1) > CELL_M / 2)
+    plain, filled = look(drive, scene), look(drive, scene, replace(CONFIG, fill_holes_cells=1))
+    cell = cell_of(plain, *column)
+    assert (plain.occupancy.cells[cell], plain.freed_cells) == (UNKNOWN, 0)
+    assert (filled.occupancy.cells[cell], filled.freed_cells) == (FREE, 1)
+    assert np.isinf(plain.geodesic_m[cell])
+    assert np.isfinite(filled.geodesic_m[cell])
+
+
 def test_a_floor_of_which_nothing_was_seen_is_what_the_robot_swept_and_no_larger():
     upstairs = moved(along_x(room=UPSTAIRS), xy_m=along_x().xy_m + 900.0)
     view = look(upstairs, scene_map([HALL], [upstairs]), NARROW)

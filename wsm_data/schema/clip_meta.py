@@ -32,7 +32,7 @@ class ClipMeta:
         map_origin_cell: (ix, iy) of cell (0, 0) of the crop on the world's grid.
         map_resolution_m: side of a map cell, m.
         map_from: `cloud` or `depth`.
-        freed_cells: unknown cells that are free because the expert's footprint swept them.
+        freed_cells: unknown cells that are free because the expert's footprint swept them, or as filled holes.
         goal_radius_m: radius r_g of the goal region, m.
         robot_radius_m: radius of the footprint by which obstacles were inflated, m.
         camera_height_m: height of the camera above the floor, m.
