@@ -17,6 +17,9 @@ from wsm_data.shards.inventory import InventoryRow, parse_inventory, parse_quara
 from wsm_data.shards.manifest import ReleaseManifest, parse_manifest
 from wsm_data.shards.names import INDEX_NAME, INVENTORY_NAME, MANIFEST_NAME, QUARANTINE_NAME
 
+_PLACES_IN_A_RUN = ("release", "pack/release")
+"""Where a release lies in the folder of `wsm pack`, and in that of a run."""
+
 
 @dataclass(frozen=True, eq=False)
 class Release:
@@ -104,7 +107,7 @@ def open_release(location: str | Path) -> Release:
     """Open the release at a path or URL.
 
     Raises:
-        ConfigError: there is no such folder.
+        ConfigError: there is no such folder, or the release lies in a folder below it.
         IntegrityError: the release is unfinished (no dataset.json), of another schema version, or its index is not the
             one the manifest vouches for.
     """
@@ -123,7 +126,7 @@ def read_manifest(store: Store) -> ReleaseManifest:
     """Read dataset.json.
 
     Raises:
-        ConfigError: there is no such folder.
+        ConfigError: there is no such folder, or the release lies in a folder below it.
         IntegrityError: the release is unfinished, or its manifest is not one of this schema version.
     """
     if not store.exists(MANIFEST_NAME):
@@ -133,8 +136,19 @@ def read_manifest(store: Store) -> ReleaseManifest:
             raise ConfigError(
                 f"there is no release at {store.root}; give the folder that holds {MANIFEST_NAME}"
             ) from error
+        _refuse_outer_folder(store)
         raise IntegrityError(f"{store.root} has no {MANIFEST_NAME}, so the release is unfinished; run `wsm pack` again")
-    return parse_manifest(store.read(MANIFEST_NAME), f"{store.root}/{MANIFEST_NAME}")
+    try:
+        return parse_manifest(store.read(MANIFEST_NAME), f"{store.root}/{MANIFEST_NAME}")
+    except IntegrityError as error:
+        raise IntegrityError(f"{error}. Fetch the release again, or write it again with `wsm pack`") from error
+
+
+def _refuse_outer_folder(store: Store) -> None:
+    """The release of a run lies below the run's folder: say where, to those who gave that."""
+    for place in _PLACES_IN_A_RUN:
+        if store.exists(f"{place}/{MANIFEST_NAME}"):
+            raise ConfigError(f"{store.root} is no release, but holds one: give {store.root}/{place}")
 
 
 def checked_file(store: Store, name: str, sha256: str) -> bytes:

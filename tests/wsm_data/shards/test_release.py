@@ -1,4 +1,5 @@
 import re
+import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -66,6 +67,22 @@ def test_manifest_inventory_and_quarantine_are_at_hand(tiny: SimpleNamespace) ->
 def test_a_folder_without_manifest_is_unfinished(tiny: SimpleNamespace) -> None:
     (tiny.folder / "dataset.json").unlink()
     with pytest.raises(IntegrityError, match="the release is unfinished"):
+        open_release(tiny.folder)
+
+
+@pytest.mark.parametrize("inside", ["pack/release", "release"])
+def test_the_folder_of_a_run_is_refused_with_the_place_of_its_release(
+    inside: str, tiny: SimpleNamespace, tmp_path: Path
+) -> None:
+    shutil.copytree(tiny.folder, tmp_path / "run" / inside)
+    with pytest.raises(ConfigError, match=f"is no release, but holds one: give {tmp_path / 'run' / inside}$"):
+        open_release(tmp_path / "run")
+
+
+@pytest.mark.parametrize("content", [b"", b"[]", b"{}", b"\xff\x00"])
+def test_a_manifest_that_is_none_says_what_to_do(content: bytes, tiny: SimpleNamespace) -> None:
+    (tiny.folder / "dataset.json").write_bytes(content)
+    with pytest.raises(IntegrityError, match=r"Fetch the release again, or write it again with `wsm pack`$"):
         open_release(tiny.folder)
 
 
