@@ -4,14 +4,16 @@ import errno
 import importlib
 import inspect
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 
 from pipelines.engines.choice import EngineName
+from pipelines.recipe import recipe_summaries
 from pipelines.registry import STAGES, StageEntry
 from wsm_data.errors import WsmError
 
@@ -92,7 +94,8 @@ _OPTIONS: dict[str, tuple[Any, Any]] = {
     ),
     "quiet": (Annotated[bool, typer.Option("--quiet", "-q", help="No progress bars.")], False),
 }
-"""The options of every command that runs stages: annotation and default. They stand here, and only here."""
+"""The options of every command that runs stages: annotation and default. A test holds the defaults to those of
+`pipelines.runner.RunOptions`, which is not imported here: `wsm --help` would wait for it."""
 
 _OUT_OPTIONAL = (
     Annotated[
@@ -103,8 +106,17 @@ _OUT_OPTIONAL = (
 
 ReleaseArgument = Annotated[str, typer.Argument(metavar="RELEASE", help="Folder or URL of a release.")]
 
+_NO_ARGUMENTS: Mapping[str, Any] = MappingProxyType({})
 
-def _command(name: str, summary: str, call: Callable[..., None], **arguments: Any) -> None:
+
+def _command(
+    name: str,
+    summary: str,
+    call: Callable[..., None],
+    *,
+    arguments: Mapping[str, Any] = _NO_ARGUMENTS,
+    epilog: str = "",
+) -> None:
     """Register a command that takes `arguments` (annotations by name) and then all of `_OPTIONS`."""
     parameters = [
         *(inspect.Parameter(one, inspect.Parameter.KEYWORD_ONLY, annotation=kind) for one, kind in arguments.items()),
@@ -119,7 +131,7 @@ def _command(name: str, summary: str, call: Callable[..., None], **arguments: An
 
     command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     command.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
-    app.command(name, help=summary)(command)
+    app.command(name, help=summary, epilog=epilog)(command)
 
 
 def _load(module: str) -> Any:
@@ -132,9 +144,16 @@ def _fail(message: str, code: int) -> None:
     sys.exit(code)
 
 
+def _recipe_list() -> str:
+    """The recipes of the project, one a line; the first line keeps click from wrapping them."""
+    return "\n".join(["\b", "Recipes:", *(f"  {name}: {summary}" for name, summary in recipe_summaries().items())])
+
+
 def _add_stage_command(entry: StageEntry) -> None:
     arguments = {"release": ReleaseArgument} if entry.reads_release else {}
-    _command(entry.name, entry.summary, lambda **values: _load("stages").run_one(entry.name, **values), **arguments)
+    _command(
+        entry.name, entry.summary, lambda **values: _load("stages").run_one(entry.name, **values), arguments=arguments
+    )
 
 
 for _entry in STAGES:
@@ -144,7 +163,10 @@ _command(
     "run",
     "Run the stages of a recipe into one run folder.",
     lambda **values: _load("stages").run_recipe(**values),
-    recipe=Annotated[str, typer.Argument(metavar="RECIPE", help="Name of a recipe, or path of a TOML file.")],
+    epilog=_recipe_list(),
+    arguments={
+        "recipe": Annotated[str, typer.Argument(metavar="RECIPE", help="Name of a recipe, or path of a TOML file.")]
+    },
 )
 _command(
     "demo",

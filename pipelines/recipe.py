@@ -6,12 +6,14 @@ from pathlib import Path
 from typing import Any
 
 from pipelines.config import input_fields, merge
+from pipelines.layout import release_folder
 from pipelines.registry import STAGES, load_stage
 from wsm_data.errors import ConfigError
 from wsm_data.files.typed_toml import build_config, convert, did_you_mean, load_toml
 
 _FOLDER = Path(__file__).parent / "recipes"
 _NAMES = tuple(entry.name for entry in STAGES)
+_READS_RELEASE = frozenset(entry.name for entry in STAGES if entry.reads_release)
 _KEYS: dict[str, Any] = {"stages": tuple[str, ...], "source": str, "summary": str}
 
 
@@ -64,20 +66,37 @@ def stage_sections(values: Mapping[str, Any], where: str) -> dict[str, Mapping[s
 
 
 def stage_config(recipe: Recipe, name: str, run: Path) -> Any:
-    """The config of one stage of a run: every input field named after a stage is that stage's folder in the run."""
+    """The config of one stage of a run.
+
+    Every input field named after a stage is that stage's folder in the run; what looks at the release decodes it with
+    the weights that it was encoded with.
+    """
     stage = load_stage(name)
-    inputs: dict[str, Any] = {one: str(run / one) for one in input_fields(stage.config_type) if one in _NAMES}
+    wanted = input_fields(stage.config_type)
+    inputs: dict[str, Any] = {one: str(run / one) for one in wanted if one in _NAMES}
     settings = recipe.settings.get(name, {})
     if name == "index" and "source" not in settings:
         inputs["source"] = _source(recipe, run)
-    if name in ("verify", "report"):
-        inputs["release"] = str(run / "pack" / "release")
+    if name in _READS_RELEASE:
+        inputs["release"] = str(release_folder(run / "pack"))
+        weights = _codec_settings(recipe).get("weights", "")
+        inputs |= {"weights": weights} if "weights" in wanted else {}
     return build_config(stage.config_type, merge(inputs, settings), name)
 
 
 def recipe_names() -> Sequence[str]:
     """Names of the recipes that come with the project."""
     return sorted(path.stem for path in _FOLDER.glob("*.toml"))
+
+
+def recipe_summaries() -> Mapping[str, str]:
+    """What each recipe that comes with the project is for, by its name."""
+    return {name: convert(str, load_toml(_recipe_path(name))["summary"], "summary") for name in recipe_names()}
+
+
+def _codec_settings(recipe: Recipe) -> Mapping[str, Any]:
+    codec = recipe.settings.get("encode", {}).get("codec", {})
+    return codec if isinstance(codec, Mapping) else {}  # `wsm encode` refuses what is no section
 
 
 def _source(recipe: Recipe, run: Path) -> str:

@@ -19,6 +19,10 @@ from wsm_data.files.jsonlines import read_lines
 from wsm_data.schema.verdict import Refusal
 
 
+class UpstreamMissing(ConfigError):
+    """An upstream stage has not come as far as it must: nothing is wrong with the request but its time."""
+
+
 def upstream_records(config: Any) -> dict[str, StageRecord]:
     """Records of the stages a config takes its inputs from, by the field that names the folder."""
     records = {name: read_stage_record(Path(getattr(config, name))) for name in input_fields(config)}
@@ -29,18 +33,23 @@ def require_stage(folder: Path, name: str) -> StageRecord:
     """The record of an upstream stage that has come to its end and is not older than its own inputs.
 
     Raises:
-        ConfigError: the folder holds no output of that stage, one that was cut short, or one that is out of date.
+        UpstreamMissing: the folder is empty, its stage was cut short, or its output is out of date.
+        ConfigError: the folder holds the output of another stage.
     """
     record = read_stage_record(folder)
-    if record is None or record.name != name:
-        found = "nothing" if record is None else f"the output of `wsm {record.name}`"
+    if record is None:
+        raise UpstreamMissing(f"{folder} must hold the output of `wsm {name}`, found nothing; run `wsm {name}` first")
+    if record.name != name:
+        found = f"the output of `wsm {record.name}`"
         raise ConfigError(f"{folder} must hold the output of `wsm {name}`, found {found}; run `wsm {name}` first")
     if not record.finished:
-        raise ConfigError(f"`wsm {name}` has not come to its end in {folder}; run the same command again to resume it")
+        raise UpstreamMissing(
+            f"`wsm {name}` has not come to its end in {folder}; run the same command again to resume it"
+        )
     for field, seen in record.seen.items():
         upstream = read_stage_record(Path(record.config[field]))
         if upstream is not None and upstream.finished != seen:
-            raise ConfigError(f"{folder} is older than its input {record.config[field]}; run `wsm {name}` again")
+            raise UpstreamMissing(f"{folder} is older than its input {record.config[field]}; run `wsm {name}` again")
     return record
 
 

@@ -1,25 +1,29 @@
 """`wsm STAGE`, `wsm run` and `wsm demo`: build configs, run stages, print what came of it."""
 
-import json
 import logging
 import os
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import MISSING, fields, replace
 from pathlib import Path
 from typing import Any
 
 import typer
 
-from pipelines.config import config_json, merge, parse_assignments
-from pipelines.engines.choice import engine
+from pipelines.commands.dry_run import show_run, show_stage
+from pipelines.config import input_fields, merge, parse_assignments
+from pipelines.engines.choice import EngineName, engine
 from pipelines.folder import read_stage_record
 from pipelines.recipe import Recipe, load_recipe, stage_config, stage_sections
 from pipelines.registry import load_stage, load_stage_module
-from pipelines.report import StageReport, summary_table
+from pipelines.report import summary_table
 from pipelines.runner import RunOptions, fingerprint, run_stage
+from wsm_data.codecs.registry import CodecConfig, describe_codec
 from wsm_data.errors import ConfigError
 from wsm_data.files.digest import digest_json
 from wsm_data.files.typed_toml import build_config, load_toml
+
+_RESULTS: Mapping[str, tuple[str, str]] = {"pack": ("release", "release"), "report": ("report", "report.html")}
+"""What a stage makes for people to look at: what it is called, and where in the stage's folder it lies."""
 
 
 def run_one(
@@ -39,52 +43,94 @@ def run_one(
         assignments: `key=value` words.
         release: the release that `verify` and `report` look at.
         options: what to run now.
+
+    Raises:
+        ConfigError: a setting, an input or an option is wrong, missing or of no use here.
     """
     if name == "verify" and out is None:
+        _refuse_unused({**options, "config": config, "set": assignments})
         clips = load_stage_module(name).require_sound(release, options["quiet"])
         typer.echo(f"{release} is whole: {clips} clips, every byte and every trajectory accounted for")
         return
     stage = load_stage(name)
     values = stage_sections(load_toml(config), str(config)).get(name, {}) if config else {}
     given = {"release": release} if release else {}
-    built = build_config(stage.config_type, merge(merge(values, given), parse_assignments(assignments or ())), "")
-    report = _run(name, built, out or Path(name), options.pop("engine"), _options(options))
+    values = merge(merge(values, given), parse_assignments(assignments or ()))
+    _require_inputs(name, stage.config_type, values)
+    built = build_config(stage.config_type, values, "")
+    engine_name = options.pop("engine")
+    run_options = _options(options)
+    if run_options.dry_run:
+        show_stage(name, built, out or Path(name), run_options)
+        return
+    report = run_stage(stage, built, out or Path(name), run_options, engine(engine_name))
     typer.echo(summary_table([report]))
+    _print_result(name, report.out)
 
 
 def run_recipe(recipe: str, out: Path, config: Path | None, assignments: Sequence[str] | None, **options: Any) -> None:
-    """Run the stages of a recipe into `out`, each in a folder of its own, and say where the results are."""
+    """Run the stages of a recipe into `out`, each in a folder of its own, and say where the results are.
+
+    The settings of all stages are built before the first of them runs.
+
+    Raises:
+        ConfigError: the recipe, a setting or an option is wrong.
+    """
     loaded = load_recipe(recipe, config, parse_assignments(assignments or ()))
-    if (
-        options["limit"] or options["only"]
-    ):  # the selection narrows the first stage; the release says that it is partial
+    if options["limit"] or options["only"]:  # it narrows the first stage; the release says that it is partial
         loaded = replace(loaded, settings=merge({"pack": {"partial": True}}, loaded.settings))
-    engine_name = options.pop("engine")
-    run_options = _options(options)
-    out = _fork(loaded, out) if run_options.fork else out
-    run_options = replace(run_options, fork=False)
-    reports: list[StageReport] = []
-    for position, name in enumerate(loaded.stages):
-        if run_options.dry_run and not _inputs_exist(loaded, name, out):
-            typer.echo(f"{name}: will be planned when the stages before it have run")
-            continue
-        built = stage_config(loaded, name, out)
-        chosen = run_options if position == 0 else replace(run_options, limit=0, only=())
-        reports.append(_run(name, built, out / name, engine_name, chosen))
-    typer.echo(summary_table(reports))
-    for label, path in (("release", out / "pack" / "release"), ("report", out / "report" / "report.html")):
-        if path.exists():
-            typer.echo(f"{label}: {path}")
+    run_engine = engine(options.pop("engine"))
+    chosen = _options(options)
+    out = _fork(loaded, out) if chosen.fork else out
+    first = replace(chosen, fork=False)
+    others = replace(first, limit=0, only=())
+    configs = _checked_configs(loaded, out)
+    if chosen.dry_run:
+        show_run(configs, out, first, others)
+        return
+    for position, (name, built) in enumerate(configs.items()):
+        report = run_stage(load_stage(name), built, out / name, others if position else first, run_engine)
+        typer.echo(summary_table([report]))  # now, for a later stage may stop the run
+    for name in configs:
+        _print_result(name, out / name)
 
 
-def _run(name: str, config: Any, out: Path, engine_name: str, options: RunOptions) -> StageReport:
-    if options.dry_run:
-        typer.echo(f"{name}: settings\n{json.dumps(config_json(config), indent=2)}")
-    report = run_stage(load_stage(name), config, out, options, engine(engine_name))
-    if options.dry_run:
-        for unit in report.ran:
-            typer.echo(f"{name}: would do {unit}")
-    return report
+def _checked_configs(recipe: Recipe, out: Path) -> dict[str, Any]:
+    """Settings of every stage, in the order of the flow."""
+    configs = {name: stage_config(recipe, name, out) for name in recipe.stages}
+    for config in configs.values():
+        codec = getattr(config, "codec", None)
+        if isinstance(codec, CodecConfig):
+            describe_codec(codec)  # it fails where the codec cannot be built, and loads no network
+    return configs
+
+
+def _require_inputs(name: str, config_type: Any, values: Mapping[str, Any]) -> None:
+    """Name every input that is missing at once; what else may be wrong is found when the config is built."""
+    known = {one.name: one for one in fields(config_type)}
+    required = [one for one in input_fields(config_type) if known[one].default is MISSING]
+    missing = [one for one in required if one not in values]
+    if missing and set(values) <= set(known):
+        words = " ".join(f"--set {one}=FOLDER" for one in missing)
+        raise ConfigError(f"`wsm {name}` must know where its inputs are: add {words}")
+
+
+def _refuse_unused(options: Mapping[str, Any]) -> None:
+    """A release that is verified without a record has neither settings nor units: only `quiet` counts."""
+    unset = {**vars(RunOptions()), "workers": 0, "engine": EngineName.LOCAL}
+    unused = [name for name, value in options.items() if name != "quiet" and value and value != unset.get(name)]
+    if unused:
+        words = ", ".join(f"--{name.replace('_', '-')}" for name in unused)
+        raise ConfigError(
+            f"without --out the whole release is read and nothing is recorded, so {words} would do nothing: leave that "
+            "out, or add --out FOLDER"
+        )
+
+
+def _print_result(name: str, out: Path) -> None:
+    label, place = _RESULTS.get(name, ("", ""))
+    if label and (out / place).exists():
+        typer.echo(f"{label}: {out / place}")
 
 
 def _options(values: dict[str, Any]) -> RunOptions:
@@ -101,11 +147,3 @@ def _fork(recipe: Recipe, out: Path) -> Path:
     if all(record is None or record.fingerprint == wanted[name] for name, record in records.items()):
         return out
     return out.with_name(f"{out.name}-{digest_json(wanted)[:8]}")
-
-
-def _inputs_exist(recipe: Recipe, name: str, out: Path) -> bool:
-    try:
-        load_stage(name).list_units(stage_config(recipe, name, out))
-    except ConfigError:
-        return False
-    return True

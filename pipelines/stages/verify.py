@@ -63,12 +63,15 @@ def _process(batch: Sequence[Unit], config: VerifyConfig, context: StageContext)
 
 
 def _message(location: str, findings: Sequence[Finding]) -> str:
-    lines = [
-        f"  {finding.kind}: {' '.join(part for part in (finding.shard, finding.clip) if part)}: {finding.message}"
-        for finding in findings[:_SHOWN_FINDINGS]
-    ]
+    lines = [f"  {_line(finding)}" for finding in findings[:_SHOWN_FINDINGS]]
     more = [f"  and {len(findings) - _SHOWN_FINDINGS} more"] if len(findings) > _SHOWN_FINDINGS else []
-    return "\n".join([f"{location} is damaged, {len(findings)} findings:", *lines, *more])
+    count = f"{len(findings)} finding{'s' if len(findings) > 1 else ''}"
+    return "\n".join([f"{location} is damaged, {count}:", *lines, *more])
+
+
+def _line(finding: Finding) -> str:
+    place = " ".join(part for part in (finding.shard, finding.clip) if part)
+    return ": ".join(part for part in (finding.kind, place, finding.message) if part)
 
 
 STAGE = Stage(name="verify", version=1, config_type=VerifyConfig, list_units=_list_units, process=_process)

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from pipelines.config import parse_assignments
-from pipelines.recipe import Recipe, load_recipe, recipe_names, stage_config, stage_sections
+from pipelines.recipe import Recipe, load_recipe, recipe_names, recipe_summaries, stage_config, stage_sections
 from pipelines.registry import STAGES
 from wsm_data.errors import ConfigError
 
@@ -84,6 +84,32 @@ def test_input_fields_named_after_a_stage_are_that_stages_folder_in_the_run():
 def test_a_run_that_generates_its_data_reads_them_from_its_own_folder():
     recipe = Recipe(stages=("synth", "index"))
     assert stage_config(recipe, "index", Path("run")).source == Path("run/synth/tree")
+
+
+def test_what_shows_a_release_decodes_it_with_the_weights_it_was_encoded_with():
+    changes = parse_assignments(["source=tree", "encode.codec.weights=vae"])
+    recipe = load_recipe("interndata_wan", None, changes)
+    assert stage_config(recipe, "encode", Path("run")).codec.weights == "vae"
+    assert stage_config(recipe, "report", Path("run")).weights == "vae"
+    assert stage_config(recipe, "verify", Path("run")).release == "run/pack/release"
+    assert stage_config(load_recipe("demo", None, {}), "report", Path("run")).weights == ""
+
+
+def test_other_weights_may_be_given_to_the_report():
+    recipe = load_recipe("interndata_wan", None, parse_assignments(["encode.codec.weights=a", "report.weights=b"]))
+    assert stage_config(recipe, "report", Path("run")).weights == "b"
+
+
+def test_a_codec_that_is_no_section_is_left_to_the_stage_that_owns_it():
+    recipe = load_recipe("demo", None, parse_assignments(["encode.codec=wan"]))
+    assert stage_config(recipe, "report", Path("run")).weights == ""
+    with pytest.raises(ConfigError, match=r"encode\.codec is a section"):
+        stage_config(recipe, "encode", Path("run"))
+
+
+def test_every_recipe_says_in_a_line_what_it_is_for():
+    assert list(recipe_summaries()) == list(recipe_names())
+    assert all(summary and "\n" not in summary for summary in recipe_summaries().values())
 
 
 def test_a_recipe_without_a_source_says_how_to_give_one():

@@ -31,12 +31,26 @@ def release(tmp_path_factory):
     recipe = Recipe(stages=stages, settings=settings, source=str(root / "source"))
     for name in stages:
         config = stage_config(recipe, name, root / "run")
-        run_stage(load_stage(name), config, root / "run" / name, RunOptions(quiet=True))
+        run_stage(load_stage(name), config, root / "run" / name, RunOptions(quiet=True, max_refused=1000))
     return root / "run" / "pack" / "release"
 
 
 def inspect(release, key=None, out=None, rerun=None, limit=20, weights=""):
     inspect_release(str(release), key, out, rerun, limit, weights)
+
+
+def test_a_release_is_verified_without_a_record_and_what_would_be_ignored_is_refused(release, capsys):
+    app(["verify", str(release), "--quiet"], standalone_mode=False)
+    assert capsys.readouterr().out == f"{release} is whole: 3 clips, every byte and every trajectory accounted for\n"
+    with pytest.raises(SystemExit) as stopped:
+        app(["verify", str(release), "--set", "x=1", "--limit", "2", "--dry-run"])
+    assert stopped.value.code == 2
+    assert "so --limit, --dry-run, --set would do nothing" in capsys.readouterr().err
+
+
+def test_a_report_of_a_release_says_where_it_is(release, capsys, tmp_path):
+    app(["report", str(release), "--quiet", "-w", "1", "-o", str(tmp_path / "page")], standalone_mode=False)
+    assert capsys.readouterr().out.splitlines()[-1] == f"report: {tmp_path / 'page' / 'report.html'}"
 
 
 def test_a_release_is_listed_with_its_clips_and_what_was_dropped(release, capsys):
@@ -112,5 +126,9 @@ def test_weights_that_do_not_belong_to_the_codec_are_refused(release, tmp_path):
 def test_a_release_that_is_not_there_or_unfinished_is_named(release, tmp_path):
     with pytest.raises(ConfigError, match="there is no release at"):
         inspect(tmp_path / "absent")
+    for above in (release.parent, release.parent.parent):
+        with pytest.raises(ConfigError, match=rf"is no release, but holds one: give {release}$"):
+            inspect(above)
+    (tmp_path / "begun").mkdir()
     with pytest.raises(IntegrityError, match="unfinished"):
-        inspect(release.parent)
+        inspect(tmp_path / "begun")

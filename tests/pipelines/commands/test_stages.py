@@ -1,10 +1,15 @@
 """`wsm run`: stages in their order, in one folder, again and beside."""
 
+from dataclasses import fields, replace
+
 import pytest
 from fake_wsm import use_fake_stages
 
 from pipelines import recipe, registry
-from pipelines.commands.stages import run_recipe
+from pipelines.cli import _OPTIONS
+from pipelines.commands.stages import run_one, run_recipe
+from pipelines.folder import read_stage_record, write_stage_record
+from pipelines.runner import RunOptions
 from wsm_data.errors import ConfigError
 
 OPTIONS = {
@@ -43,7 +48,8 @@ def run(tmp_path, source, calls):
 
 def test_the_stages_of_a_recipe_run_in_order_and_their_table_is_printed(run, tmp_path, capsys):
     run()
-    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == ["stage", "copy", "join"]
+    first_words = [line.split()[0] for line in capsys.readouterr().out.splitlines()]
+    assert first_words == ["stage", "copy", "stage", "join"]
     assert (tmp_path / "run" / "join" / "a1").read_text() == "text of a1!"
 
 
@@ -65,6 +71,79 @@ def test_a_dry_run_plans_what_can_be_planned_and_writes_nothing(run, tmp_path, c
     assert "copy: would do a1" in said
     assert "join: will be planned when the stages before it have run" in said
     assert not (tmp_path / "run").exists()
+    assert said.index("copy: settings") < said.index("join: settings") < said.index("copy: would do a1")
+
+
+def test_a_dry_run_plans_every_stage_whose_inputs_are_there(run, capsys):
+    run()
+    capsys.readouterr()
+    run(dry_run=True)
+    said = capsys.readouterr().out
+    assert "will be planned" not in said
+    assert "would do" not in said
+
+
+def test_a_dry_run_after_a_change_upstream_leaves_the_rest_open(run, tmp_path, source, capsys):
+    run()
+    folder = tmp_path / "run" / "copy"
+    write_stage_record(folder, replace(read_stage_record(folder), finished=""))  # as a kill leaves it
+    (source / "a2.txt").write_text("changed")
+    run(dry_run=True)
+    said = capsys.readouterr().out
+    assert "copy: would do a2" in said
+    assert "join: will be planned when the stages before it have run" in said
+
+
+def test_a_dry_run_counts_the_units_it_does_not_list(run, source, capsys):
+    for number in range(30):
+        (source / f"c{number:02d}.txt").write_text("more")
+    run(dry_run=True)
+    said = capsys.readouterr().out
+    assert said.count("copy: would do") == 20
+    assert "copy: and 13 more, 33 in all" in said
+
+
+@pytest.mark.parametrize("dry_run", [True, False])
+@pytest.mark.parametrize(
+    ("assignment", "said"),
+    [
+        ("join.cpoy=x", r"unknown key join\.cpoy; did you mean join\.copy\?"),
+        ("copy.sorce=x", r"unknown key copy\.sorce; did you mean copy\.source\?"),
+    ],
+)
+def test_settings_of_every_stage_are_checked_before_the_first_runs(run, calls, tmp_path, assignment, said, dry_run):
+    with pytest.raises(ConfigError, match=said):
+        run(assignment, dry_run=dry_run)
+    assert calls() == []
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_stage_that_ended_is_told_of_although_a_later_one_fails(run, tmp_path, capsys):
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "join").write_text("in the way")
+    with pytest.raises(ConfigError, match="join must be a folder"):
+        run()
+    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == ["stage", "copy"]
+
+
+def test_a_selection_of_nothing_is_refused(run, tmp_path):
+    with pytest.raises(ConfigError, match=r"--only z\* matches none of 3 units; ids look like a1"):
+        run(only=["a*", "z*"])
+    assert not (tmp_path / "run").exists()
+
+
+def test_all_missing_inputs_of_a_stage_are_named_at_once(tmp_path):
+    with pytest.raises(ConfigError, match=r"add --set copy=FOLDER$"):
+        run_one("join", tmp_path / "join", None, None, **{**OPTIONS, "dry_run": True})
+    with pytest.raises(ConfigError, match="unknown key cpoy; did you mean copy"):
+        run_one("join", tmp_path / "join", None, ["cpoy=x"], **OPTIONS)
+
+
+def test_the_defaults_of_the_command_line_are_those_of_the_options():
+    told = {name: default for name, (_, default) in _OPTIONS.items()}
+    for field in fields(RunOptions):
+        if field.name != "workers":  # 0 of the command line stands for one a core
+            assert told[field.name] == field.default or not (told[field.name] or field.default)
 
 
 def test_changed_settings_stop_the_run_before_anything_is_written(run, tmp_path):
@@ -83,3 +162,11 @@ def test_a_fork_runs_changed_settings_in_a_folder_beside_and_stays_where_nothing
     assert len(beside) == 1
     assert (beside[0] / "join" / "a1").read_text() == "text of a1" * 2 + "!"
     assert (tmp_path / "run" / "join" / "a1").read_text() == "text of a1!"
+
+
+def test_a_codec_that_cannot_begin_stops_the_run_before_its_first_stage(tmp_path, monkeypatch):
+    monkeypatch.undo()  # the real stages
+    words = ["source=absent", f"encode.codec.weights={tmp_path / 'vae'}"]
+    with pytest.raises(ConfigError, match="codec dct has no weights"):
+        run_recipe("interndata", tmp_path / "run", None, words, **OPTIONS)
+    assert not (tmp_path / "run").exists()

@@ -102,7 +102,7 @@ def test_stages_that_are_older_than_their_inputs_are_refused(encoded):
 def test_without_a_single_clip_there_is_nothing_to_pack(make_pipeline):
     pipeline = make_pipeline({HALL: ({0: along_x(y_m=1.7)}, True)})  # through the pillar
     pipeline.run_to("encode")
-    with pytest.raises(ConfigError, match="holds no clip; `wsm encode` and the quarantine files say"):
+    with pytest.raises(ConfigError, match=r"holds no clip; refused were\n  1 x path\.through_obstacle, as: .+"):
         pipeline.run("pack")
 
 

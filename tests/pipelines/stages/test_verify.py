@@ -72,6 +72,15 @@ def test_a_flipped_byte_is_named_by_shard_and_clip_and_member(pipeline, name):
     assert message.startswith(f"{pipeline.release} is damaged, 2 findings:")
 
 
+def test_one_finding_is_one_and_a_file_beside_the_shards_is_named_once(pipeline):
+    (pipeline.release / "quarantine.jsonl").unlink()
+    with pytest.raises(IntegrityError) as caught:
+        require_sound(str(pipeline.release), quiet=True)
+    first, line = str(caught.value).splitlines()
+    assert first == f"{pipeline.release} is damaged, 1 finding:"
+    assert line == f"  file.changed: {pipeline.release}/quarantine.jsonl is missing; fetch it again"
+
+
 def test_damage_is_never_recorded_as_done_and_is_found_again(pipeline):
     pipeline.run("verify")
     shard, offset = member_of(pipeline.release, f"{ZED}/000000", "poses")
