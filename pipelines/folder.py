@@ -1,13 +1,14 @@
 """A stage's output folder: stage.json, ledger.jsonl, quarantine.jsonl and the outputs, for one writer at a time."""
 
+import errno
 import fcntl
 import json
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 from pipelines.stage import Outcome
 from wsm_data.errors import ConfigError, IntegrityError, Reason
@@ -21,10 +22,19 @@ QUARANTINE_FILE, PENDING_FILE = "quarantine.jsonl", "pending.jsonl"
 
 @dataclass(frozen=True, kw_only=True)
 class LedgerEntry:
-    """The last word on a unit: the key it was settled under, and what became of it."""
+    """The last word on a unit.
+
+    Attributes:
+        key: key it was settled under.
+        outcome: what became of it.
+        sizes: bytes of its outputs when it was settled, in their order; None for what was no file.
+        stale: the unit is pending by now, or not listed for the time being; its outputs are kept for when it returns.
+    """
 
     key: str
     outcome: Outcome
+    sizes: tuple[int | None, ...] = ()
+    stale: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,6 +52,7 @@ class StageRecord:
         units: number of units in the listing.
         workers: worker processes of the last run.
         finished: digest of the outcomes `finish` was last called with; empty before.
+        outputs: size in bytes of every file that `finish` wrote, by its name relative to the folder.
     """
 
     name: str
@@ -54,6 +65,7 @@ class StageRecord:
     units: int = 0
     workers: int = 1
     finished: str = ""
+    outputs: Mapping[str, int | None] = field(default_factory=dict)
 
 
 def read_stage_record(folder: Path) -> StageRecord | None:
@@ -78,9 +90,20 @@ def write_stage_record(folder: Path, record: StageRecord) -> None:
     write_text(folder / STAGE_FILE, json.dumps(vars(record), indent=2, sort_keys=True) + "\n")
 
 
-def read_ledger(folder: Path) -> dict[str, LedgerEntry]:
-    """The last entry of every unit."""
-    return {str(line["unit"]): _entry_from_line(line) for line in read_lines(folder / LEDGER_FILE)}
+def read_ledger(folder: Path, *, with_stale: bool = False) -> dict[str, LedgerEntry]:
+    """The last entry of every unit; stale ones, which are no part of the stage's result, only if they are asked for."""
+    entries = {str(line["unit"]): _entry_from_line(line) for line in read_lines(folder / LEDGER_FILE)}
+    return {unit: entry for unit, entry in entries.items() if with_stale or not entry.stale}
+
+
+def size_on_disk(path: Path) -> int | None:
+    """Bytes of a file; None for a folder and for what is not there."""
+    return path.stat().st_size if path.is_file() else None
+
+
+def is_as_written(path: Path, size: int | None) -> bool:
+    """Whether an output is still there, with its size where that is known."""
+    return path.exists() if size is None else size_on_disk(path) == size
 
 
 @contextmanager
@@ -93,27 +116,34 @@ def ledger_appender(folder: Path) -> Iterator[Callable[[LedgerEntry], LedgerEntr
     with line_appender(folder / LEDGER_FILE) as append_line:
 
         def append(entry: LedgerEntry) -> LedgerEntry:
-            return _entry_from_line(append_line({**_ledger_line(entry), "time": round(time.time(), 3)}))
+            sizes = [size_on_disk(folder / output) for output in entry.outcome.outputs]
+            line = {**_ledger_line(entry), "sizes": sizes, "time": round(time.time(), 3)}
+            return _entry_from_line(append_line(line))
 
         yield append
 
 
-def compact_ledger(folder: Path, entries: Mapping[str, LedgerEntry]) -> None:
-    """Keep only the given entries, and delete the files that only others wrote: units that left the source.
+def compact_ledger(folder: Path, settled: Mapping[str, LedgerEntry], stale: Mapping[str, LedgerEntry]) -> None:
+    """Keep only the given entries, mark the stale ones, and delete the files that only others wrote.
 
-    Lines keep their text, times included; a ledger that holds nothing else is left alone.
+    Lines keep their text, times included; a ledger in which nothing changes is left alone.
     """
     lines = list(read_lines(folder / LEDGER_FILE))
-    last = {str(line["unit"]): line for line in lines}
-    kept = {unit: line for unit, line in last.items() if unit in entries and line["key"] == entries[unit].key}
-    if len(kept) == len(lines):
+    kept = []
+    for unit, line in {str(line["unit"]): line for line in lines}.items():
+        plain = {name: value for name, value in line.items() if name != "stale"}
+        if unit in settled and settled[unit].key == line["key"]:
+            kept.append(plain)
+        elif unit in stale and stale[unit].key == line["key"]:
+            kept.append({**plain, "stale": True})
+    if kept == lines:
         return
-    wanted = {output for line in kept.values() for output in _outputs(line)}
+    wanted = {output for line in kept for output in _outputs(line)}
     for line in lines:
         for output in _outputs(line):
             if output not in wanted and (folder / output).is_file():
                 (folder / output).unlink()
-    write_lines(folder / LEDGER_FILE, kept.values())
+    write_lines(folder / LEDGER_FILE, kept)
 
 
 def _outputs(line: Mapping[str, Any]) -> Sequence[str]:
@@ -166,10 +196,9 @@ def locked(folder: Path) -> Iterator[None]:
     """Hold the folder against a second writer; the lock falls with the process, however it ends.
 
     Raises:
-        ConfigError: another process holds it.
+        ConfigError: another process holds it, or there can be no such folder.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    with (folder / ".lock").open("w") as file:
+    with _lock_file(folder) as file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
@@ -178,6 +207,16 @@ def locked(folder: Path) -> Iterator[None]:
             ) from error
         drop_torn_line(folder / LEDGER_FILE)
         yield
+
+
+def _lock_file(folder: Path) -> TextIO:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        return (folder / ".lock").open("w")
+    except OSError as error:
+        if error.errno in (errno.ENOSPC, errno.EDQUOT):  # no fault of the request
+            raise
+        raise ConfigError(f"{folder} must be a folder that can be written ({error}); use another --out") from error
 
 
 def _entry_from_line(line: Mapping[str, Any]) -> LedgerEntry:
@@ -190,4 +229,5 @@ def _entry_from_line(line: Mapping[str, Any]) -> LedgerEntry:
         refusals=tuple(refusal_from_json(record) for record in line["refusals"]),
         seconds=line["seconds"],
     )
-    return LedgerEntry(key=line["key"], outcome=outcome)
+    sizes = tuple(line.get("sizes", ()))
+    return LedgerEntry(key=line["key"], outcome=outcome, sizes=sizes, stale=line.get("stale", False))

@@ -1,10 +1,12 @@
 """What a run of a stage did, as a value and as the table that is printed at its end."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from pipelines.stage import DONE, REFUSED, Settled
+from wsm_data.schema.verdict import Refusal
 
 _MILLION, _THOUSAND = 1e6, 1e4
 
@@ -21,9 +23,11 @@ class StageReport:
         done: units of the listing that are done.
         refused: units of the listing that are refused.
         pending: units of the listing that have no outcome yet.
-        refusals: number of refusals by reason; parts of a done unit count too.
+        refused_parts: refused parts of units that are done, and what `finish` refused.
+        refusals: number of refusals by reason; refused parts count too.
         facts: numeric facts of done units, summed.
         seconds: wall time of this run.
+        waits_for: inputs that have pending units, so that what is listed here is not the last word.
     """
 
     stage: str
@@ -33,22 +37,24 @@ class StageReport:
     done: int
     refused: int
     pending: int
+    refused_parts: int = 0
     refusals: Mapping[str, int] = field(default_factory=dict)
     facts: Mapping[str, float] = field(default_factory=dict)
     seconds: float = 0.0
+    waits_for: tuple[str, ...] = ()
 
 
-def stage_report(stage: str, out: Path, settled: Settled, ran: Sequence[str], seconds: float) -> StageReport:
-    """Count the outcomes of a stage."""
+def stage_report(
+    stage: str, out: Path, settled: Settled, ran: Sequence[str], seconds: float, extra: Sequence[Refusal] = ()
+) -> StageReport:
+    """Count the outcomes of a stage, and the refusals that belong to none of them."""
     outcomes = settled.outcomes.values()
     facts: dict[str, float] = {}
-    refusals: dict[str, int] = {}
     for outcome in outcomes:
         for name, value in outcome.facts.items():
             if isinstance(value, (int, float)) and not isinstance(value, bool):
                 facts[name] = facts.get(name, 0) + value
-        for refusal in outcome.refusals:
-            refusals[refusal.reason] = refusals.get(refusal.reason, 0) + 1
+    refusals = Counter(one.reason.value for one in (*(two for one in outcomes for two in one.refusals), *extra))
     return StageReport(
         stage=stage,
         out=out,
@@ -57,6 +63,7 @@ def stage_report(stage: str, out: Path, settled: Settled, ran: Sequence[str], se
         done=sum(outcome.state == DONE for outcome in outcomes),
         refused=sum(outcome.state == REFUSED for outcome in outcomes),
         pending=len(settled.pending),
+        refused_parts=sum(len(outcome.refusals) for outcome in outcomes if outcome.state == DONE) + len(extra),
         refusals=dict(sorted(refusals.items())),
         facts=dict(sorted(facts.items())),
         seconds=seconds,
@@ -72,7 +79,7 @@ def summary_table(reports: Sequence[StageReport]) -> str:
             str(report.listed),
             str(len(report.ran)),
             str(report.done),
-            str(report.refused),
+            f"{report.refused} + {report.refused_parts} parts" if report.refused_parts else str(report.refused),
             str(report.pending),
             f"{report.seconds:.1f}",
             ", ".join(f"{name} {_number(value)}" for name, value in report.facts.items()),
@@ -84,7 +91,12 @@ def summary_table(reports: Sequence[StageReport]) -> str:
     reasons = [
         f"  {report.stage}: {count} x {reason}" for report in reports for reason, count in report.refusals.items()
     ]
-    return "\n".join([*lines, *(["refused or noted, by reason:", *reasons] if reasons else [])])
+    waiting = [
+        f"{report.stage} will be listed anew once nothing is pending in: {', '.join(report.waits_for)}"
+        for report in reports
+        if report.waits_for
+    ]
+    return "\n".join([*lines, *(["refused, by reason:", *reasons] if reasons else []), *waiting])
 
 
 def _cell(row: Sequence[str], column: int, width: int) -> str:

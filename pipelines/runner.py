@@ -13,6 +13,7 @@ from typing import Any
 
 from tqdm import tqdm
 
+from pipelines.budget import RefusalCount, count_refusals, over_budget, with_outcome
 from pipelines.config import config_json, differences, settings_of
 from pipelines.engines.choice import Engine
 from pipelines.engines.local import run_local
@@ -22,16 +23,18 @@ from pipelines.folder import (
     LedgerEntry,
     StageRecord,
     compact_ledger,
+    is_as_written,
     ledger_appender,
     locked,
     read_ledger,
     read_stage_record,
+    size_on_disk,
     write_quarantine,
     write_stage_record,
 )
 from pipelines.report import StageReport, stage_report
-from pipelines.stage import REFUSED, Outcome, Settled, Stage, StageContext, Unit, refused
-from pipelines.upstream import upstream_records
+from pipelines.stage import REFUSED, Finished, Outcome, Settled, Stage, StageContext, Unit, refused
+from pipelines.upstream import pending_units, quarantine_of, upstream_records
 from wsm_data.errors import BudgetExceeded, ConfigError, DataError, WsmError
 from wsm_data.files.atomic import remove_temporaries
 from wsm_data.files.digest import digest_json
@@ -48,7 +51,9 @@ class RunOptions:
         limit: at most this many pending units; 0 for all.
         only: patterns of unit ids (`gibson_*/*`); empty for all.
         dry_run: list what would be done and stop.
-        max_refused: units that may be refused: a share of the listing below 1, a number from 1 on.
+        max_refused: what may be refused. Below 1 a share: of the listed units, and by itself of the parts that were
+            found in them (trajectories in a container), which is known when all selected units are settled. From 1 on
+            a number: of refused units and refused parts together. What `finish` refuses counts as parts.
         fork: when the settings differ from those in the folder, use a folder beside it instead of stopping.
         retry_refused: try refused units again although neither their input nor the settings changed.
         quiet: no progress bar.
@@ -72,8 +77,10 @@ class _Job:
     config: Any
     out: Path
     record: StageRecord
+    waits_for: tuple[str, ...]
     units: Sequence[Unit]
     keys: Mapping[str, str]
+    finish_inputs: Mapping[str, str]
     ledger: dict[str, LedgerEntry]
     options: RunOptions
     engine: Engine
@@ -94,18 +101,22 @@ def run_stage(
     """Bring a stage's folder up to date with its inputs.
 
     A unit is done again when its inputs, the settings or its outputs are not what the ledger says. Killed at any
-    point, the next call goes on where this one was.
+    point, the next call goes on where this one was. Finished work is deleted only when its unit was done again, or is
+    not listed although no stage before this one has pending units, from which it might come back.
 
     Raises:
-        ConfigError: the folder belongs to other settings, or is being written by another process.
-        BudgetExceeded: more units were refused than `options.max_refused` allows.
+        ConfigError: the folder belongs to other settings, or is being written by another process; or `options.only`
+            matches nothing.
+        BudgetExceeded: more was refused than `options.max_refused` allows.
         WsmError: the disk is full, or two units have one id.
     """
     options = options or RunOptions()
     started = time.monotonic()
     upstream = upstream_records(config)  # before the listing: what changes while that is read is seen as newer
+    waits_for = tuple(name for name in upstream if pending_units(Path(getattr(config, name))))
     units = stage.list_units(config)
     _require_unique(stage, units)
+    _require_match(stage, units, options.only)
     record = _record(stage, config, upstream, len(units), options.workers)
     out = _choose_folder(out, record, options.fork)
     keys = {unit.id: unit_key(record, unit) for unit in units}
@@ -114,15 +125,17 @@ def run_stage(
         config=config,
         out=out,
         record=record,
+        waits_for=waits_for,
         units=units,
         keys=keys,
+        finish_inputs=stage.finish_inputs(config) if stage.finish_inputs else {},
         ledger={},
         options=options,
         engine=engine,
     )
     if options.dry_run:
         job.ledger.update(_standing(out))
-        return stage_report(stage.name, out, job.settled(), [unit.id for unit in _selected(job)], 0.0)
+        return _report(job, _selected(job), 0.0)
     with _full_disk_named(out), locked(out):
         remove_temporaries(out)
         job.ledger.update(_standing(out))
@@ -133,7 +146,15 @@ def run_stage(
             _finish(job)
         else:
             _keep_record_current(job)
-    return stage_report(stage.name, out, job.settled(), [unit.id for unit in todo], time.monotonic() - started)
+    return _report(job, todo, time.monotonic() - started)
+
+
+def _report(job: _Job, ran: Sequence[Unit], seconds: float) -> StageReport:
+    settled = job.settled()
+    known = {(one.unit, one.source, one.reason) for outcome in settled.outcomes.values() for one in outcome.refusals}
+    extra = [one for one in quarantine_of(job.out) if (one.unit, one.source, one.reason) not in known]
+    report = stage_report(job.stage.name, job.out, settled, [unit.id for unit in ran], seconds, extra)
+    return replace(report, waits_for=job.waits_for)
 
 
 def fingerprint(stage: Stage[Any], config: Any) -> str:
@@ -150,6 +171,13 @@ def _require_unique(stage: Stage[Any], units: Sequence[Unit]) -> None:
     twice = [unit for unit, count in Counter(unit.id for unit in units).items() if count > 1]
     if twice:
         raise WsmError(f"{stage.name}: unit ids must be unique, found twice: {', '.join(sorted(twice)[:5])}")
+
+
+def _require_match(stage: Stage[Any], units: Sequence[Unit], only: Sequence[str]) -> None:
+    unmatched = [one for one in only if not fnmatch.filter([unit.id for unit in units], one)]
+    if unmatched:
+        example = f"; ids look like {units[0].id}" if units else ""
+        raise ConfigError(f"{stage.name}: --only {' '.join(unmatched)} matches none of {len(units)} units{example}")
 
 
 def _record(
@@ -188,9 +216,14 @@ def _choose_folder(out: Path, record: StageRecord, fork: bool) -> Path:
 
 
 def _standing(out: Path) -> dict[str, LedgerEntry]:
-    """The last word on every unit whose outputs are still there; one whose outputs are gone is pending again."""
-    ledger = read_ledger(out)
-    return {unit: one for unit, one in ledger.items() if all((out / output).exists() for output in one.outcome.outputs)}
+    """The last word on every unit whose outputs are as it left them; one whose outputs are not is pending again."""
+    return {unit: entry for unit, entry in read_ledger(out, with_stale=True).items() if _is_whole(out, entry)}
+
+
+def _is_whole(out: Path, entry: LedgerEntry) -> bool:
+    outputs = entry.outcome.outputs
+    sizes = entry.sizes or (None,) * len(outputs)
+    return all(is_as_written(out / output, size) for output, size in zip(outputs, sizes, strict=True))
 
 
 def _selected(job: _Job) -> list[Unit]:
@@ -213,9 +246,9 @@ def _is_settled(job: _Job, unit: Unit) -> bool:
 
 def _work(job: _Job, todo: Sequence[Unit]) -> None:
     again = {unit.id for unit in todo}
-    settled = job.settled().outcomes
-    refusals = sum(outcome.state == REFUSED for unit, outcome in settled.items() if unit not in again)
-    _keep_to_budget(job, refusals)
+    standing = [outcome for unit, outcome in job.settled().outcomes.items() if unit not in again]
+    count = replace(count_refusals(standing, len(job.units), job.stage.parts_fact), found=None)
+    _keep_to_budget(job, count)
     work = partial(_process_batch, job.stage, job.config, StageContext(out=job.out))
     hidden = job.options.quiet or not todo
     with (
@@ -225,20 +258,21 @@ def _work(job: _Job, todo: Sequence[Unit]) -> None:
     ):
         for outcome in outcomes:
             job.ledger[outcome.unit] = append(LedgerEntry(key=job.keys[outcome.unit], outcome=outcome))
-            refusals += outcome.state == REFUSED
+            count = with_outcome(count, outcome)
             bar.update()
-            _keep_to_budget(job, refusals)
+            _keep_to_budget(job, count)
 
 
-def _keep_to_budget(job: _Job, refusals: int) -> None:
-    limit, listed = job.options.max_refused, len(job.units)
-    if refusals <= (limit if limit >= 1 else limit * listed):
+def _keep_to_budget(job: _Job, count: RefusalCount, extra: Sequence[Refusal] = ()) -> None:
+    exceeding = over_budget(job.options.max_refused, count)
+    if not exceeding:
         return
-    _write_refusals(job, ())
+    _write_refusals(job, extra)
+    first = _refusals(job, extra)[0]
     raise BudgetExceeded(
-        f"{job.stage.name}: {refusals} of {listed} units were refused, more than --max-refused {limit:g} allows; the "
-        f"reasons are in {job.out / QUARANTINE_FILE}. Mend the source, or raise --max-refused and run the same command "
-        "again: what is done is kept."
+        f"{job.stage.name}: {exceeding} were refused, more than --max-refused {job.options.max_refused:g} allows; the "
+        f"first is {first.unit} ({first.reason}: {first.message}), and all are in {job.out / QUARANTINE_FILE}. Mend "
+        "the source, or raise --max-refused and run the same command again: what is done is kept."
     )
 
 
@@ -283,15 +317,21 @@ def _full_disk_named(folder: Path) -> Iterator[None]:
 
 
 def _is_finished(job: _Job) -> bool:
-    """Whether `finish` came to its end for these very outcomes, upstream states and inputs of its own."""
+    """Whether `finish` came to its end for these very outcomes and upstream states, and what it wrote is there."""
     old = read_stage_record(job.out)
-    return old is not None and old.finished == _state(job)
+    if old is None or old.finished != _state(job):
+        return False
+    written = {PENDING_FILE: None, QUARANTINE_FILE: None, **old.outputs}
+    return all(is_as_written(job.out / output, size) for output, size in written.items())
 
 
 def _keep_record_current(job: _Job) -> None:
     """Inputs may lie elsewhere than when the stage was finished: later stages find them through the record."""
     old = read_stage_record(job.out)
-    if old is not None and old != (new := replace(job.record, finished=old.finished, workers=old.workers)):
+    if old is None:
+        return
+    new = replace(job.record, finished=old.finished, workers=old.workers, outputs=old.outputs)
+    if old != new:
         write_stage_record(job.out, new)
 
 
@@ -305,7 +345,7 @@ def _state(job: _Job) -> str:
             ),
             list(settled.pending),
             dict(job.record.seen),
-            dict(job.stage.finish_inputs(job.config)) if job.stage.finish_inputs else {},
+            dict(job.finish_inputs),
         ]
     )
 
@@ -313,13 +353,31 @@ def _state(job: _Job) -> str:
 def _finish(job: _Job) -> None:
     """Write what belongs to no single unit, the record last."""
     settled = job.settled()
-    extra = job.stage.finish(job.config, StageContext(out=job.out), settled) if job.stage.finish else ()
-    _write_refusals(job, extra)
-    compact_ledger(job.out, {unit: job.ledger[unit] for unit in settled.outcomes})
+    end = job.stage.finish(job.config, StageContext(out=job.out), settled) if job.stage.finish else Finished()
+    outcomes = settled.outcomes.values()
+    _keep_to_budget(job, count_refusals(outcomes, len(job.units), job.stage.parts_fact, end.refusals), end.refusals)
+    _write_refusals(job, end.refusals)
+    compact_ledger(job.out, {unit: job.ledger[unit] for unit in settled.outcomes}, _stale(job))
     write_lines(job.out / PENDING_FILE, [{"unit": unit} for unit in settled.pending])
-    write_stage_record(job.out, replace(job.record, finished=_state(job)))
+    outputs = {output: size_on_disk(job.out / output) for output in end.outputs}
+    write_stage_record(job.out, replace(job.record, finished=_state(job), outputs=outputs))
+
+
+def _stale(job: _Job) -> dict[str, LedgerEntry]:
+    """Finished work that is no result now, and may be one again without being done again.
+
+    A unit is not listed when the upstream unit it follows from is pending, such as the trajectories of a container that
+    a limited run did not come to; only once nothing is pending before this stage has it left the source.
+    """
+    settled = job.settled()
+    may_return = set(job.ledger) if job.waits_for else set(settled.pending)
+    return {unit: entry for unit, entry in job.ledger.items() if unit in may_return and unit not in settled.outcomes}
 
 
 def _write_refusals(job: _Job, extra: Sequence[Refusal]) -> None:
-    refusals = [refusal for outcome in job.settled().outcomes.values() for refusal in outcome.refusals]
-    write_quarantine(job.out, job.record, [*refusals, *extra])
+    write_quarantine(job.out, job.record, _refusals(job, extra))
+
+
+def _refusals(job: _Job, extra: Sequence[Refusal]) -> list[Refusal]:
+    outcomes = job.settled().outcomes.values()
+    return [*(refusal for outcome in outcomes for refusal in outcome.refusals), *extra]

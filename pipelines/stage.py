@@ -41,7 +41,8 @@ class Outcome:
         unit: id of the unit.
         state: `done` or `refused`.
         digest: digest of what was written: the input digest of the units that follow from it.
-        outputs: files written, relative to the stage's folder; a unit whose files are gone is done again.
+        outputs: files written, relative to the stage's folder; a unit is done again when one is gone or has another
+            size.
         facts: JSON values worth keeping in the ledger.
         refusals: what was refused: the unit itself, or parts of a unit that is done (episodes of a container).
         seconds: time the unit took.
@@ -81,6 +82,20 @@ class Settled:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Finished:
+    """What `finish` did.
+
+    Attributes:
+        refusals: what only the whole can refuse.
+        outputs: files written, relative to the stage's folder; the stage is finished again when one is gone or has
+            another size.
+    """
+
+    refusals: tuple[Refusal, ...] = ()
+    outputs: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
 class Stage(Generic[ConfigT]):
     """One step of the pipeline.
 
@@ -92,7 +107,9 @@ class Stage(Generic[ConfigT]):
         process: works on the units of one batch and yields an outcome each; a `DataError` that escapes refuses the
             units that have none yet.
         finish: called once all selected units are settled and something changed since it was last called; writes what
-            belongs to no single unit and returns refusals that only the whole can know. None where there is nothing.
+            belongs to no single unit. None where there is nothing.
+        parts_fact: numeric fact of an outcome that counts the parts of the unit that were kept, by whose number refused
+            parts are judged; empty where a unit is one piece.
         finish_inputs: digest of each input that `finish` alone reads, by name; a changed one has it called again
             although no unit is redone. None where there is none.
     """
@@ -102,7 +119,8 @@ class Stage(Generic[ConfigT]):
     config_type: type[ConfigT]
     list_units: Callable[[ConfigT], Sequence[Unit]]
     process: Callable[[Sequence[Unit], ConfigT, StageContext], Iterator[Outcome]]
-    finish: Callable[[ConfigT, StageContext, Settled], Sequence[Refusal]] | None = None
+    finish: Callable[[ConfigT, StageContext, Settled], Finished] | None = None
+    parts_fact: str = ""
     finish_inputs: Callable[[ConfigT], Mapping[str, str]] | None = None
 
 

@@ -92,7 +92,7 @@ def test_an_outcome_is_read_back_as_it_was_returned_when_it_was_added(tmp_path):
     (returned,) = add(tmp_path, whole)
     assert read_ledger(tmp_path) == {"a": returned}
     expected = replace(whole.outcome, facts={"words": ["a", "b"], "n": 1}, seconds=1.2346)
-    assert returned == replace(whole, outcome=expected)
+    assert returned == replace(whole, outcome=expected, sizes=(None, None))  # nobody wrote them
 
 
 def test_a_torn_last_line_is_as_if_it_had_not_been_written(tmp_path):
@@ -115,7 +115,7 @@ def test_compacting_keeps_the_lines_that_count_and_deletes_files_that_nobody_cla
         entry("a", "2", outputs=("new", "shared")),
     )
     lines = (tmp_path / "ledger.jsonl").read_bytes().splitlines(keepends=True)
-    compact_ledger(tmp_path, {"a": entry("a", "2")})
+    compact_ledger(tmp_path, {"a": entry("a", "2")}, {})
     assert {path.name for path in tmp_path.iterdir()} == {"new", "shared", "ledger.jsonl"}
     assert (tmp_path / "ledger.jsonl").read_bytes() == lines[2]
 
@@ -123,14 +123,25 @@ def test_compacting_keeps_the_lines_that_count_and_deletes_files_that_nobody_cla
 def test_a_ledger_with_nothing_to_compact_is_left_alone(tmp_path):
     add(tmp_path, entry("a", outputs=("x",)))
     before = (tmp_path / "ledger.jsonl").stat().st_ino
-    compact_ledger(tmp_path, {"a": entry("a")})
+    compact_ledger(tmp_path, {"a": entry("a")}, {})
     assert (tmp_path / "ledger.jsonl").stat().st_ino == before
 
 
 def test_compacting_passes_over_files_that_are_gone_already(tmp_path):
     add(tmp_path, entry("a", outputs=("never written",)))
-    compact_ledger(tmp_path, {})
+    compact_ledger(tmp_path, {}, {})
     assert read_ledger(tmp_path) == {}
+
+
+def test_a_stale_line_keeps_its_files_and_is_read_only_by_who_asks_for_it(tmp_path):
+    (tmp_path / "kept").write_bytes(b"1234")
+    add(tmp_path, entry("a", outputs=("kept",)), entry("b"))
+    compact_ledger(tmp_path, {"b": entry("b")}, {"a": entry("a")})
+    assert list(read_ledger(tmp_path)) == ["b"]
+    stale = read_ledger(tmp_path, with_stale=True)["a"]
+    assert (stale.stale, stale.sizes, (tmp_path / "kept").exists()) == (True, (4,), True)
+    compact_ledger(tmp_path, {"a": entry("a"), "b": entry("b")}, {})
+    assert not read_ledger(tmp_path)["a"].stale
 
 
 # the quarantine
@@ -197,6 +208,17 @@ def test_the_lock_falls_with_an_error(tmp_path):
         raise KeyError
     with locked(tmp_path):
         pass
+
+
+@pytest.mark.parametrize("out", ["file", "file/below"])
+def test_a_folder_that_cannot_be_is_a_wrong_request(tmp_path, out):
+    (tmp_path / "file").write_text("here already")
+    with (
+        pytest.raises(ConfigError, match=r"must be a folder that can be written .*; use another"),
+        locked(tmp_path / out),
+    ):
+        pass
+    assert (tmp_path / "file").read_text() == "here already"
 
 
 def test_the_lock_file_is_empty_and_the_same_in_every_folder(tmp_path):

@@ -22,7 +22,7 @@ def test_outcomes_are_counted_and_numeric_facts_summed():
         },
         pending=("e",),
     )
-    report = stage_report("index", Path("out"), settled, ["a", "b"], 2.5)
+    report = stage_report("index", Path("out"), settled, ["a", "b"], 2.5, [refusal("x", Reason.EPISODE_DUPLICATE)])
     assert report == StageReport(
         stage="index",
         out=Path("out"),
@@ -31,7 +31,8 @@ def test_outcomes_are_counted_and_numeric_facts_summed():
         done=2,
         refused=2,
         pending=1,
-        refusals={"frame.empty": 2, "pose.jump": 1},
+        refused_parts=2,
+        refusals={"episode.duplicate": 1, "frame.empty": 2, "pose.jump": 1},
         facts={"frames": 7, "metres": 1.5},
         seconds=2.5,
     )
@@ -53,10 +54,20 @@ def test_the_table_is_aligned_and_says_refusals_by_reason():
         "stage  units  ran  done  refused  pending  seconds  facts",
         "index      3    1     2        1        0     12.3  frames 12,345, metres 2.50, bytes 3.2 M",
         "split      1    1     1        0        0      0.0",
-        "refused or noted, by reason:",
+        "refused, by reason:",
         "  index: 1 x frame.empty",
     ]
 
 
 def test_without_refusals_nothing_is_said_of_them():
-    assert "refused or noted" not in summary_table([one("split")])
+    assert "by reason" not in summary_table([one("split")])
+
+
+def test_refused_parts_stand_beside_refused_units():
+    line = summary_table([one("index", refused_parts=8)]).splitlines()[1]
+    assert line.split() == ["index", "3", "1", "2", "1", "+", "8", "parts", "0", "12.3"]
+
+
+def test_a_stage_that_waits_for_another_is_named():
+    last = summary_table([one("map", waits_for=("index",))]).splitlines()[-1]
+    assert last == "map will be listed anew once nothing is pending in: index"

@@ -64,6 +64,57 @@ def test_a_unit_whose_output_is_missing_is_done_again_and_the_stage_finished_aga
     assert read_stage_record(out).finished == finished
 
 
+def test_a_unit_whose_output_has_another_size_is_done_again(config, out, calls):
+    run_stage(COPY, config, out, ANY)
+    calls()
+    (out / "copies" / "b1.txt").write_text("cut")
+    assert run_stage(COPY, config, out, ANY).ran == ("b1",)
+    assert copies(out)["b1"] == "text of b1"
+
+
+@pytest.mark.parametrize("name", ["words.json", "quarantine.jsonl", "pending.jsonl"])
+def test_what_finish_wrote_is_written_again_when_it_is_gone(config, out, calls, name):
+    run_stage(COPY, config, out, ANY)
+    before = content(out)
+    calls()
+    (out / name).unlink()
+    assert run_stage(COPY, config, out, ANY).ran == ()
+    assert calls() == ["finish"]
+    assert content(out) == before
+
+
+def test_what_finish_wrote_is_written_again_when_it_has_another_size(config, out):
+    run_stage(COPY, config, out, ANY)
+    before = (out / "words.json").read_bytes()
+    (out / "words.json").write_bytes(before[:-1])
+    run_stage(COPY, config, out, ANY)
+    assert (out / "words.json").read_bytes() == before
+
+
+def test_changed_units_that_a_limited_run_does_not_come_to_keep_their_outputs(config, out):
+    run_stage(COPY, config, out, ANY)
+    for name in ("a2", "b1"):
+        (config.source / f"{name}.txt").write_text("other")
+    run_stage(COPY, config, out, replace(ANY, limit=1))
+    assert copies(out) == {"a1": "text of a1", "a2": "other", "b1": "text of b1"}
+    assert set(read_ledger(out)) == {"a1", "a2"}
+    (config.source / "b1.txt").write_text("text of b1")
+    report = run_stage(COPY, config, out, ANY)
+    assert (report.ran, report.done) == ((), 3)
+    assert set(read_ledger(out)) == {"a1", "a2", "b1"}
+
+
+def test_finish_is_called_again_when_what_it_alone_reads_changed(config, out, calls):
+    told = {"manifest": "1"}
+    stage = replace(COPY, finish_inputs=lambda _: told)
+    run_stage(stage, config, out, ANY)
+    run_stage(stage, config, out, ANY)
+    calls()
+    told["manifest"] = "2"
+    assert run_stage(stage, config, out, ANY).ran == ()
+    assert calls() == ["finish"]
+
+
 def test_a_unit_that_left_the_source_leaves_the_folder_with_its_files_and_nothing_is_worked_on(config, out, calls):
     run_stage(COPY, config, out, ANY)
     calls()
@@ -217,11 +268,42 @@ def test_an_error_that_escapes_a_batch_refuses_the_units_that_have_no_outcome_ye
     assert set(copies(out)) == {"a1", "b1"}
 
 
-def test_a_part_of_a_done_unit_can_be_refused_without_counting_against_the_budget(config, out):
+def test_a_refused_part_of_a_done_unit_stands_in_the_quarantine_and_in_the_report(config, out):
     (config.source / "a1.txt").write_text("partly bad")
-    report = run_stage(COPY, config, out, replace(ANY, max_refused=0))
-    assert (report.refused, report.refusals) == (0, {"frame.missing": 1})
+    report = run_stage(COPY, config, out, ANY)
+    assert (report.refused, report.refused_parts, report.refusals) == (0, 1, {"frame.missing": 1})
     assert refused_units(out) == [("a1/part", "frame.missing")]
+
+
+@pytest.mark.parametrize(("max_refused", "stops"), [(0, True), (0.3, True), (0.4, False), (1, False)])
+def test_refused_parts_count_against_the_budget_and_downstream_sees_no_end(config, out, max_refused, stops):
+    """`copy` does not count parts, so they are judged by its three units: one is 0.33 of them."""
+    (config.source / "a1.txt").write_text("partly bad")
+    if not stops:
+        assert run_stage(COPY, config, out, replace(ANY, max_refused=max_refused)).done == 3
+        return
+    with pytest.raises(BudgetExceeded, match=r"copy: 1 of 3 parts were refused.* a1/part \(frame.missing: one frame\)"):
+        run_stage(COPY, config, out, replace(ANY, max_refused=max_refused))
+    assert refused_units(out) == [("a1/part", "frame.missing")]
+    assert not read_stage_record(out).finished
+    assert run_stage(COPY, config, out, ANY).ran == ()
+
+
+def test_where_parts_are_counted_a_share_is_one_of_the_parts(config, out):
+    """Each byte stands for a part: 10 + 5 + 4 were kept and one was refused, a twentieth."""
+    counting = replace(COPY, parts_fact="bytes")
+    for name, text in (("a1", "partly bad"), ("a2", "12345"), ("b1", "1234")):
+        (config.source / f"{name}.txt").write_text(text)
+    with pytest.raises(BudgetExceeded, match=r"copy: 1 of 20 bytes were refused, more than --max-refused 0\.04"):
+        run_stage(counting, config, out, replace(ANY, max_refused=0.04))
+    assert run_stage(counting, config, out, replace(ANY, max_refused=0.05)).done == 3
+
+
+def test_what_finish_refuses_counts_against_the_budget(config, out):
+    (config.source / "twin").touch()
+    with pytest.raises(BudgetExceeded, match=r"1 of 3 parts were refused.*twin \(episode.duplicate: found twice\)"):
+        run_stage(COPY, config, out, replace(ANY, max_refused=0.1))
+    assert run_stage(COPY, config, out, replace(ANY, max_refused=1)).refused_parts == 1
 
 
 def test_what_finish_refuses_stands_in_the_quarantine_too(config, out):

@@ -6,8 +6,9 @@ import pytest
 from fake_runs import ANY
 from fake_stages import COPY, JOIN, JoinConfig
 
-from pipelines.folder import read_stage_record
+from pipelines.folder import read_ledger, read_stage_record
 from pipelines.runner import run_stage
+from pipelines.stage import Finished
 from pipelines.upstream import done_outcomes, pending_units, quarantine_of, require_stage, upstream_records
 from wsm_data.errors import ConfigError, Reason
 
@@ -17,6 +18,52 @@ def joined(config, out):
     run_stage(COPY, config, out, ANY)
     run_stage(JOIN, JoinConfig(copy=out), out.with_name("join"), ANY)
     return out.with_name("join")
+
+
+def test_work_that_follows_from_a_pending_unit_is_kept_and_is_no_result_until_that_unit_is_done(
+    config, out, joined, calls
+):
+    (config.source / "a1.txt").write_text("other")
+    (config.source / "b1.txt").write_text("other")
+    run_stage(COPY, config, out, replace(ANY, limit=1))
+    limited = run_stage(JOIN, JoinConfig(copy=out), joined, ANY)
+    assert (limited.ran, limited.listed, limited.waits_for) == (("a1",), 2, ("copy",))
+    assert list(done_outcomes(out)) == list(done_outcomes(joined)) == ["a1", "a2"]
+    assert (joined / "b1").read_text() == "text of b1!"
+    (config.source / "b1.txt").write_text("text of b1")
+    calls()
+    assert run_stage(COPY, config, out, ANY).ran == ()
+    assert calls() == ["finish"]
+    whole = run_stage(JOIN, JoinConfig(copy=out), joined, ANY)
+    assert (whole.ran, whole.done, whole.waits_for) == ((), 3, ())
+    assert list(done_outcomes(joined)) == ["a1", "a2", "b1"]
+
+
+def test_work_whose_unit_comes_back_changed_is_done_again_and_replaces_what_was_kept(config, out, joined):
+    (config.source / "b1.txt").write_text("other")
+    run_stage(COPY, config, out, replace(ANY, only=("a*",)))
+    run_stage(JOIN, JoinConfig(copy=out), joined, ANY)
+    run_stage(COPY, config, out, ANY)
+    assert run_stage(JOIN, JoinConfig(copy=out), joined, ANY).ran == ("b1",)
+    assert (joined / "b1").read_text() == "other!"
+
+
+def test_work_that_was_kept_goes_once_nothing_is_pending_and_its_unit_did_not_come_back(config, out, joined):
+    (config.source / "b1.txt").write_text("other")
+    run_stage(COPY, config, out, replace(ANY, only=("a*",)))
+    run_stage(JOIN, JoinConfig(copy=out), joined, ANY)
+    assert (joined / "b1").exists()
+    (config.source / "b1.txt").unlink()
+    run_stage(COPY, config, out, ANY)
+    run_stage(JOIN, JoinConfig(copy=out), joined, ANY)
+    assert not (joined / "b1").exists()
+    assert set(read_ledger(joined, with_stale=True)) == {"a1", "a2"}
+
+
+def test_a_dry_run_names_the_input_whose_pending_units_may_change_what_it_lists(config, out, joined):
+    (config.source / "b1.txt").write_text("other")
+    run_stage(COPY, config, out, replace(ANY, only=("a*",)))
+    assert run_stage(JOIN, JoinConfig(copy=out), joined, replace(ANY, dry_run=True)).waits_for == ("copy",)
 
 
 def test_a_change_goes_exactly_to_its_descendants(config, out, joined):
@@ -41,7 +88,7 @@ def list_after_join(config):
 
 def test_a_stage_is_finished_again_when_its_input_moved_on_though_no_unit_changed(config, out, joined):
     finished = []
-    counting = replace(JOIN, finish=lambda *_: finished.append(1) or ())
+    counting = replace(JOIN, finish=lambda *_: finished.append(1) or Finished())
     run_stage(counting, JoinConfig(copy=out), joined, ANY)
     (config.source / "c1.txt").write_text("bad")
     run_stage(COPY, config, out, ANY)

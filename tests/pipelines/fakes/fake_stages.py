@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from pathlib import Path
 
-from pipelines.stage import Outcome, Settled, Stage, StageContext, Unit
+from pipelines.stage import Finished, Outcome, Settled, Stage, StageContext, Unit
 from pipelines.upstream import done_outcomes, require_stage
 from wsm_data.errors import DataError, Reason
 from wsm_data.files.atomic import write_bytes, write_text
@@ -107,16 +107,17 @@ def copied(unit: Unit, text: str, config: CopyConfig, out: Path) -> Outcome:
     )
 
 
-def finish_copies(config: CopyConfig, context: StageContext, settled: Settled) -> Sequence[Refusal]:
+def finish_copies(config: CopyConfig, context: StageContext, settled: Settled) -> Finished:
     note(config.source, "finish")
     words = {unit: outcome.facts.get("words") for unit, outcome in settled.outcomes.items()}
     write_text(context.out / "words.json", json.dumps({"words": words, "pending": settled.pending}) + repr(words))
     if (config.source / "finish dies").exists():
         os._exit(7)
-    return [
+    twins = [
         Refusal(unit="twin", source="", reason=Reason.EPISODE_DUPLICATE, message="found twice")
         for _ in config.source.glob("twin")
     ]
+    return Finished(refusals=tuple(twins), outputs=("words.json",))
 
 
 def list_joins(config: JoinConfig) -> Sequence[Unit]:
