@@ -14,7 +14,7 @@ from pipelines.episode_table import read_episodes
 from pipelines.layout import clips_folder, codec_path, map_path, records_path
 from pipelines.scene_view import SceneView, view_scene
 from pipelines.source import IndexedSource, container_from_json, conventions_digest, indexed_source
-from pipelines.stage import Outcome, Settled, Stage, StageContext, Unit, refused
+from pipelines.stage import Finished, Outcome, Settled, Stage, StageContext, Unit, refused
 from pipelines.upstream import done_outcomes, quarantine_of, require_stage
 from wsm_data.codecs.base import VideoCodec
 from wsm_data.codecs.registry import CodecConfig, describe_codec, make_codec
@@ -211,11 +211,11 @@ def _quality(
     return measure_quality(one.videos, latents, codec, config.clip).to_json() if rank < config.quality_share else None
 
 
-def _finish(config: EncodeConfig, context: StageContext, settled: Settled) -> Sequence[Refusal]:
+def _finish(config: EncodeConfig, context: StageContext, settled: Settled) -> Finished:
     """Write what the codec says of itself beside the clips, for the release."""
     del settled
     write_text(codec_path(context.out), json.dumps(asdict(describe_codec(config.codec)), indent=2) + "\n")
-    return ()
+    return Finished(outputs=(str(codec_path(context.out).relative_to(context.out)),))
 
 
 STAGE = Stage(

@@ -9,11 +9,11 @@ from typing import Any
 
 from pipelines.config import config_json
 from pipelines.depth_fusion import fused_points
-from pipelines.episode_table import record_digest, row_from_json, write_episodes
+from pipelines.episode_table import EPISODES_FILE, record_digest, row_from_json, write_episodes
 from pipelines.folder import refusal_json
-from pipelines.layout import records_path, surface_path
+from pipelines.layout import conventions_path, records_path, surface_path
 from pipelines.source import container_json, conventions_digest, write_conventions
-from pipelines.stage import DONE, Outcome, Settled, Stage, StageContext, Unit, refused
+from pipelines.stage import DONE, Finished, Outcome, Settled, Stage, StageContext, Unit, refused
 from wsm_data.checks.record import check_record
 from wsm_data.errors import DataError, Reason
 from wsm_data.files.digest import digest_json, sha256_file
@@ -151,7 +151,7 @@ def _row(record: EpisodeRecord) -> dict[str, Any]:
     }
 
 
-def _finish(config: IndexConfig, context: StageContext, settled: Settled) -> Sequence[Refusal]:
+def _finish(config: IndexConfig, context: StageContext, settled: Settled) -> Finished:
     """Write the table of trajectories; of those found twice the first container's stays, the others are refused."""
     dataset = load_dataset(config.dataset)
     write_conventions(context.out, dataset)
@@ -169,7 +169,8 @@ def _finish(config: IndexConfig, context: StageContext, settled: Settled) -> Seq
         found = Counter(unit.split("/")[0] for unit in (*(row.id.text for row in rows), *refused_episodes))
         for line in count_differences(found, dataset.expected_episodes):
             _LOG.warning("%s", line)
-    return refusals
+    outputs = (EPISODES_FILE, str(conventions_path(context.out).relative_to(context.out)))
+    return Finished(refusals=tuple(refusals), outputs=outputs)
 
 
 def _finish_inputs(config: IndexConfig) -> Mapping[str, str]:
@@ -214,5 +215,6 @@ STAGE = Stage(
     list_units=_list_units,
     process=_process,
     finish=_finish,
+    parts_fact="trajectories",
     finish_inputs=_finish_inputs,
 )

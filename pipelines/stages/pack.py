@@ -10,7 +10,7 @@ from pipelines.inventory import account_of
 from pipelines.layout import clips_folder, codec_path, release_folder
 from pipelines.source import indexed_source
 from pipelines.split_table import read_split
-from pipelines.stage import Outcome, Settled, Stage, StageContext, Unit
+from pipelines.stage import Finished, Outcome, Settled, Stage, StageContext, Unit
 from pipelines.upstream import done_outcomes, pending_units, require_stage
 from wsm_data.codecs.quality import CodecQuality
 from wsm_data.errors import ConfigError
@@ -19,11 +19,10 @@ from wsm_data.files.typed_toml import INPUT, SELECTION
 from wsm_data.schema.codec import CodecInfo
 from wsm_data.schema.depth import DepthRange
 from wsm_data.schema.identity import EpisodeId
-from wsm_data.schema.verdict import Refusal
 from wsm_data.shards.assemble import ReleaseFacts, finish_release
 from wsm_data.shards.fragment import fragment_path, read_fragment_info
 from wsm_data.shards.manifest import ShardInfo
-from wsm_data.shards.names import MANIFEST_NAME
+from wsm_data.shards.names import INDEX_NAME, INVENTORY_NAME, MANIFEST_NAME, QUARANTINE_NAME
 from wsm_data.shards.plan import PlannedClip, ShardPlan, plan_shards
 from wsm_data.shards.writer import write_shard
 
@@ -114,10 +113,10 @@ def _process(batch: Sequence[Unit], config: PackConfig, context: StageContext) -
         yield Outcome(unit=unit.id, digest=shard.sha256, outputs=(str(path.relative_to(context.out)),), facts=facts)
 
 
-def _finish(config: PackConfig, context: StageContext, settled: Settled) -> Sequence[Refusal]:
+def _finish(config: PackConfig, context: StageContext, settled: Settled) -> Finished:
     """Write index, inventory and manifest once every shard stands."""
     if settled.pending:
-        return ()
+        return Finished()
     plans = [unit.payload for unit in _list_units(config)]
     clips = _clips(config)
     folder = clips_folder(config.encode)
@@ -132,7 +131,9 @@ def _finish(config: PackConfig, context: StageContext, settled: Settled) -> Sequ
         inventory=account.rows,
         refusals=account.quarantine,
     )
-    return ()
+    written = (INDEX_NAME, INVENTORY_NAME, QUARANTINE_NAME, MANIFEST_NAME)
+    release = release_folder(context.out).relative_to(context.out)
+    return Finished(outputs=tuple(str(release / name) for name in written))
 
 
 def _facts(config: PackConfig, clips: Mapping[str, Outcome]) -> ReleaseFacts:
