@@ -100,7 +100,8 @@ def test_a_source_declared_in_the_wrong_axes_is_refused_and_told_the_right_ones(
     assert 'camera_axes = "opengl"' in text
     manifest.write_text(text.replace('camera_axes = "opengl"', 'camera_axes = "opencv"'))
     source = make_source(cameras=("d435i",), image_scale=0.5)
-    run_pipeline(source, tmp_path / "run", settings={"index": {"dataset": str(manifest)}}, stages=("index",))
+    changed = {"index": {"dataset": str(manifest)}}
+    run_pipeline(source, tmp_path / "run", settings=changed, stages=("index",), max_refused=2)
     lines = (tmp_path / "run" / "index" / "quarantine.jsonl").read_text().splitlines()
     assert {json.loads(line)["reason"] for line in lines} <= {"mount.misfit", "pose.depth_disagree"}
     assert len(lines) == 2
