@@ -9,6 +9,7 @@ from typing import Any
 
 from pipelines.config import config_json
 from pipelines.depth_fusion import fused_points
+from pipelines.depth_gate import agreeing_records
 from pipelines.episode_table import EPISODES_FILE, record_digest, row_from_json, write_episodes
 from pipelines.folder import refusal_json
 from pipelines.layout import conventions_path, records_path, surface_path
@@ -38,7 +39,8 @@ class IndexConfig:
         source: root of the source tree: groups, with scene archives, scene folders or trajectory folders in them.
         dataset: manifest with the source's conventions: a name under manifests/datasets/, or a TOML file. What it says
             is part of every unit's inputs, what it is called is not.
-        depth_sample_every: where a scene has no cloud, every n-th depth frame is fused into its map.
+        depth_sample_every: where a scene has no cloud, every n-th depth frame is fused into its map, but for those of
+            trajectories whose depth contradicts their poses; `encode` refuses these.
     """
 
     source: Path = field(metadata=INPUT)
@@ -132,7 +134,8 @@ def _write_surface(
         if scan.cloud is not None:
             voxels = voxels_from_cloud(scan.cloud, dataset.cloud)
         else:
-            voxels = voxels_from_depth(fused_points(records, scan.depth_samples, dataset.depth))
+            agreeing = agreeing_records(records, scan.depth_samples, dataset)
+            voxels = voxels_from_depth(fused_points(agreeing, scan.depth_samples, dataset.depth))
     except DataError as error:
         container = records[0].container if records else ""
         return "", Refusal.from_error(container, container, error)

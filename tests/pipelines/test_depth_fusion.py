@@ -7,20 +7,19 @@ import pytest
 from box_room import DATASET, HALL, METRES_PER_UNIT, PILLAR, Room, along_x, encoded, frames_of, raw_depth, record_of
 
 from pipelines.depth_fusion import fused_points
-from wsm_data.schema.depth import DepthEncoding, DepthRange
+from wsm_data.schema.depth import DepthEncoding
 from wsm_data.schema.identity import EpisodeId
 
 DRIVE = along_x()
-FAR = DepthRange(min_m=0.01, max_m=100.0)
 LONGEST_RAY = float(np.linalg.norm([31.5 / 40, 23.5 / 40, 1.0]))  # of the image's corner, per metre of depth
 QUANTISATION_M = METRES_PER_UNIT / 2 * LONGEST_RAY
 """Depth is rounded to half a unit, and moves a point along its ray by that times the length of the ray."""
 
 
-def fuse(drive=DRIVE, depth_range=None, record=None, encoding=DATASET.depth, files=None):
+def fuse(drive=DRIVE, record=None, encoding=DATASET.depth, files=None):
     record = record or record_of(drive)
     files = files or dict(enumerate(frames_of(drive).depth))
-    return list(fused_points([record], {record.id.text: tuple(files.items())}, encoding, depth_range))
+    return list(fused_points([record], {record.id.text: tuple(files.items())}, encoding))
 
 
 def distance_to_surface_m(points, room):
@@ -35,13 +34,13 @@ def distance_m(points, low, high):
 
 
 def test_every_pixel_becomes_a_point_on_a_wall_to_the_rounding_of_its_depth():
-    frames = fuse(depth_range=FAR)
+    frames = fuse()
     assert [points.shape for points in frames] == [(64 * 48, 3)] * len(DRIVE.xy_m)
     assert distance_to_surface_m(np.concatenate(frames), HALL).max() <= QUANTISATION_M
 
 
 def test_what_the_camera_sees_of_a_pillar_is_there():
-    points = np.concatenate(fuse(depth_range=FAR))
+    points = np.concatenate(fuse())
     low, high = np.array(PILLAR[0]) - QUANTISATION_M, np.array(PILLAR[1]) + QUANTISATION_M
     on_pillar = ((points >= low) & (points <= high)).all(axis=1)
     assert on_pillar.sum() > 100
@@ -50,32 +49,30 @@ def test_what_the_camera_sees_of_a_pillar_is_there():
 
 def test_poses_in_other_camera_axes_put_the_points_elsewhere():
     turned = record_of(DRIVE, T_world_camera=DRIVE.T_world_camera @ np.diag([1.0, -1.0, -1.0, 1.0]))
-    assert np.median(distance_to_surface_m(np.concatenate(fuse(record=turned, depth_range=FAR)), HALL)) > 0.2
+    assert np.median(distance_to_surface_m(np.concatenate(fuse(record=turned)), HALL)) > 0.2
 
 
 def test_each_frame_is_moved_by_its_own_pose():
     files = frames_of(DRIVE).depth
-    alone = fuse(files={3: files[3]}, depth_range=FAR)
-    np.testing.assert_array_equal(alone[0], fuse(depth_range=FAR)[3])
+    alone = fuse(files={3: files[3]})
+    np.testing.assert_array_equal(alone[0], fuse()[3])
 
 
 def test_codes_without_a_measurement_are_no_points():
     raw = raw_depth(DRIVE)[0]
-    raw[:24], raw[24:30] = 0, 65535
-    (points,) = fuse(files={0: encoded(".png", raw)}, depth_range=FAR)
-    assert len(points) == 18 * 64
-    encoding = DepthEncoding(metres_per_unit=METRES_PER_UNIT, invalid_codes=(0,))
-    (points,) = fuse(files={0: encoded(".png", raw)}, depth_range=FAR, encoding=encoding)
+    raw[:24], raw[24:30] = 0, 41234
+    (points,) = fuse(files={0: encoded(".png", raw)})
     assert len(points) == 24 * 64
+    encoding = DepthEncoding(metres_per_unit=METRES_PER_UNIT, invalid_codes=(0, 41234))
+    (points,) = fuse(files={0: encoded(".png", raw)}, encoding=encoding)
+    assert len(points) == 18 * 64
 
 
-def test_depths_outside_the_range_are_left_out_and_its_ends_are_in_it():
+def test_depths_outside_the_papers_range_are_left_out_and_its_ends_are_in_it():
     raw = np.full((48, 64), 30000, np.uint16)
     raw[0, :4] = 1999, 2000, 50000, 50001  # the paper's range is 0.2 to 5 m
     (points,) = fuse(files={0: encoded(".png", raw)})
     assert len(points) == 64 * 48 - 2
-    (points,) = fuse(files={0: encoded(".png", raw)}, depth_range=DepthRange(min_m=0.15, max_m=2.9))
-    assert len(points) == 2
 
 
 @pytest.mark.parametrize("damage", [lambda png: png[: len(png) // 2], lambda png: b"", lambda png: b"no png"])

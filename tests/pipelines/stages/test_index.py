@@ -4,7 +4,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from box_room import DEPTH, HALL, MANIFEST_TOML, RGB, UPSTAIRS, along_x, cloud_points, lengths_bytes, moved, ply_bytes
+from box_room import (
+    DEPTH,
+    HALL,
+    MANIFEST_TOML,
+    RGB,
+    UPSTAIRS,
+    along_x,
+    cloud_points,
+    lengths_bytes,
+    moved,
+    ply_bytes,
+    table_bytes,
+)
 
 from pipelines.config import settings_of
 from pipelines.episode_table import read_episodes
@@ -192,6 +204,23 @@ def test_a_refused_trajectory_is_not_fused_into_the_map_of_the_others(make_pipel
     alone.run("index")
     assert alone.refusals("index") == [(f"{DEN}/000001", "episode.too_short")]
     assert alone.outcomes("index")[DEN].facts["surface"] == surface
+
+
+def test_a_trajectory_whose_depth_contradicts_its_poses_is_not_fused_into_the_map_of_the_others(make_pipeline):
+    """It is kept in the table: its refusal is said where it is encoded, with or without a cloud."""
+    alone = make_pipeline({DEN: ({0: along_x()}, False)})
+    alone.run("index")
+    surface = alone.outcomes("index")[DEN].facts["surface"]
+    alone.write(DEN, {0: along_x(), 1: along_x(y_m=1.0)}, cloud=False)
+    alone.run("index")
+    assert alone.outcomes("index")[DEN].facts["surface"] != surface
+    turned = along_x(y_m=1.0)
+    elsewhere = moved(turned, yaw_rad=turned.yaw_rad + np.pi)
+    table = alone.source / DEN / "data/chunk-000/episode_000001.parquet"
+    table.write_bytes(table_bytes(elsewhere))
+    alone.run("index")
+    assert alone.outcomes("index")[DEN].facts["surface"] == surface
+    assert alone.outcomes("index")[DEN].facts["trajectories"] == 2
 
 
 def test_a_container_that_cannot_be_read_is_refused_and_the_others_go_on(make_pipeline):
