@@ -1,5 +1,10 @@
+import errno
+import os
+from pathlib import Path
+
 import pytest
 
+from wsm_data.errors import DataError, Reason
 from wsm_data.readers.containers import find_containers
 from wsm_data.readers.members import iter_members
 
@@ -36,3 +41,96 @@ def test_trajectory_folders_in_an_archive_keep_their_names(build, tmp_path, data
     files = {f"trajectory_03/{name}": data for name, data in build.trajectory_files(build.episode(0)).items()}
     build.write_archive(tmp_path, files)
     assert members_of(tmp_path, dataset) == files
+
+
+def only_refusal(scan, reason: Reason, unit: str = "gibson_d435i/Acker.ville/000000"):
+    """The one refusal of a scan; every other episode went on."""
+    (refusal,) = scan.refusals
+    assert (refusal.reason, refusal.unit) == (reason, unit)
+    return refusal
+
+
+def break_link(path):
+    path.unlink(missing_ok=True)
+    path.symlink_to(path.parent / "gone")
+
+
+def refused(scan_all):
+    with pytest.raises(DataError) as caught:
+        scan_all()
+    return caught.value
+
+
+@pytest.mark.parametrize("kind", ["rgb", "depth", "table"])
+def test_a_link_that_leads_nowhere_refuses_its_episode_alone(build, tmp_path, scan_all, kind):
+    build.write_scene_folder(tmp_path, build.scene_files({0: build.episode(0), 1: build.episode(1)}))
+    name = {
+        "rgb": f"{build.rgb_folder}/episode_000000_003.jpg",
+        "depth": f"{build.depth_folder}/episode_000000_003.png",
+        "table": "data/chunk-000/episode_000000.parquet",
+    }[kind]
+    break_link(tmp_path / build.group / build.scene / name)
+    (scan,) = scan_all().values()
+    assert name in only_refusal(scan, Reason.FILE_UNREADABLE).message
+    assert [record.id.episode for record in scan.records] == ["000001"]
+
+
+@pytest.mark.parametrize("number", [errno.EACCES, errno.EIO])
+def test_an_image_that_cannot_be_read_refuses_its_episode_alone(build, tmp_path, scan_all, monkeypatch, number):
+    build.write_scene_folder(tmp_path, build.scene_files({0: build.episode(0), 1: build.episode(1)}))
+    fail_to_read(monkeypatch, "episode_000000_003.jpg", number)
+    (scan,) = scan_all().values()
+    refusal = only_refusal(scan, Reason.FILE_UNREADABLE)
+    assert refusal.details["error"] == errno.errorcode[number]
+    assert "episode_000000_003.jpg" in refusal.message
+
+
+def test_a_full_disk_is_no_refusal(build, tmp_path, scan_all, monkeypatch):
+    build.write_scene_folder(tmp_path, build.scene_files({0: build.episode(0)}))
+    fail_to_read(monkeypatch, "episode_000000_003.jpg", errno.ENOSPC)
+    with pytest.raises(OSError, match="No space"):
+        scan_all()
+
+
+def fail_to_read(monkeypatch, name, number):
+    read_bytes = Path.read_bytes
+
+    def failing(path):
+        if path.name == name:
+            raise OSError(number, os.strerror(number), str(path))
+        return read_bytes(path)
+
+    monkeypatch.setattr(Path, "read_bytes", failing)
+
+
+@pytest.mark.parametrize(
+    "link", ["scene", "scene.tar.gz", "scene/trajectory_01", "scene/data", "scene/videos/chunk-000"]
+)
+def test_a_container_behind_a_link_that_leads_nowhere_is_refused(build, tmp_path, scan_all, link):
+    path = tmp_path / build.group / link
+    path.parent.mkdir(parents=True)
+    break_link(path)
+    assert refused(scan_all).reason is Reason.FILE_UNREADABLE
+
+
+def test_a_cloud_behind_a_link_that_leads_nowhere_is_not_replaced_by_depth(build, tmp_path, scan_all):
+    build.write_scene_folder(tmp_path, build.scene_files({0: build.episode(0)}))
+    break_link(tmp_path / build.group / build.scene / "meta/pointcloud.ply")
+    (scan,) = scan_all().values()
+    assert (len(scan.records), scan.cloud_refusal.reason) == (1, Reason.FILE_UNREADABLE)
+    assert scan.depth_samples == {}
+
+
+def test_a_link_that_leads_nowhere_does_not_matter_where_nothing_is_read(build, tmp_path, scan_all):
+    build.write_scene_folder(tmp_path, build.scene_files({0: build.episode(0)}))
+    break_link(tmp_path / build.group / build.scene / "meta/info.json")
+    (scan,) = scan_all().values()
+    assert len(scan.records) == 1
+
+
+def test_an_unfinished_download_is_refused_even_when_it_looks_whole(build, tmp_path, scan_all):
+    path = build.write_archive(tmp_path, build.scene_files({0: build.episode(0)}))
+    path.rename(path.with_name(f"{path.name}.part"))
+    error = refused(scan_all)
+    assert error.reason is Reason.ARCHIVE_TRUNCATED
+    assert "not finished" in error.message

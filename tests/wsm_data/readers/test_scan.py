@@ -361,3 +361,25 @@ def test_clouds_of_an_archive_of_trajectories_are_put_together(build, tmp_path, 
     (scan,) = scan_all().values()
     assert len(scan.cloud.xyz_m) == 100
     assert [record.id.episode for record in scan.records] == ["000000", "000001"]
+
+
+def test_an_episode_that_is_only_named_is_refused_and_not_forgotten(build, scan_scene):
+    files = build.scene_files({0: build.episode(0), 1: build.episode(1)})
+    scan = scan_scene({name: data for name, data in files.items() if "episode_000000" not in name})
+    only_refusal(scan, Reason.EPISODE_MISSING)
+    assert [record.id.episode for record in scan.records] == ["000001"]
+
+
+def test_the_list_of_a_scene_above_its_trajectory_folders_makes_no_episodes(build, tmp_path, scan_all):
+    files = {f"trajectory_07/{name}": data for name, data in build.trajectory_files(build.episode(0)).items()}
+    files["meta/episodes.jsonl"] = b'{"episode_index": 0, "length": 7}\n'
+    build.write_archive(tmp_path, files)
+    (scan,) = scan_all().values()
+    assert ([record.id.episode for record in scan.records], scan.refusals) == (["000007"], ())
+
+
+def test_a_folder_too_high_is_told_what_the_source_must_look_like(build, tmp_path, scan_all):
+    build.write_archive(tmp_path / "above", build.scene_files({0: build.episode(0)}))
+    with pytest.raises(DataError, match="<group>/<scene>.tar.gz") as caught:
+        scan_all()
+    assert caught.value.reason is Reason.CONTAINER_NO_EPISODES
