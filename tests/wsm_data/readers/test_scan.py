@@ -380,6 +380,6 @@ def test_the_list_of_a_scene_above_its_trajectory_folders_makes_no_episodes(buil
 
 def test_a_folder_too_high_is_told_what_the_source_must_look_like(build, tmp_path, scan_all):
     build.write_archive(tmp_path / "above", build.scene_files({0: build.episode(0)}))
-    with pytest.raises(DataError, match="<group>/<scene>.tar.gz") as caught:
+    with pytest.raises(DataError, match=r"<group>/<scene>\.tar\.gz") as caught:
         scan_all()
     assert caught.value.reason is Reason.CONTAINER_NO_EPISODES
