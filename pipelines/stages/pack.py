@@ -1,6 +1,7 @@
 """`wsm pack`: clips into shards, shards into a release."""
 
 import json
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -11,9 +12,8 @@ from pipelines.layout import clips_folder, codec_path, release_folder
 from pipelines.source import indexed_source
 from pipelines.split_table import read_split
 from pipelines.stage import Finished, Outcome, Settled, Stage, StageContext, Unit
-from pipelines.upstream import done_outcomes, pending_units, require_stage
+from pipelines.upstream import UpstreamMissing, done_outcomes, pending_units, quarantine_of, require_stage
 from wsm_data.codecs.quality import CodecQuality
-from wsm_data.errors import ConfigError
 from wsm_data.files.digest import digest_json
 from wsm_data.files.typed_toml import INPUT, SELECTION
 from wsm_data.schema.codec import CodecInfo
@@ -25,6 +25,8 @@ from wsm_data.shards.manifest import ShardInfo
 from wsm_data.shards.names import INDEX_NAME, INVENTORY_NAME, MANIFEST_NAME, QUARANTINE_NAME
 from wsm_data.shards.plan import PlannedClip, ShardPlan, plan_shards
 from wsm_data.shards.writer import write_shard
+
+_SHOWN_REASONS = 3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,10 +85,18 @@ def _clips(config: PackConfig) -> Mapping[str, Outcome]:
     splits = read_split(config.split)
     clips = {name: outcome for name, outcome in done_outcomes(config.encode).items() if name in splits}
     if not clips:
-        raise ConfigError(
-            f"{config.encode} holds no clip; `wsm encode` and the quarantine files say what became of the trajectories"
-        )
+        raise UpstreamMissing(f"{config.encode} holds no clip; {_why_no_clip(config)}")
     return clips
+
+
+def _why_no_clip(config: PackConfig) -> str:
+    """The most frequent refusals of the trajectories, with one message of each."""
+    refusals = [refusal for folder in (config.index, config.encode) for refusal in quarantine_of(folder)]
+    if not refusals:
+        return "no trajectory was encoded, and none was refused: look at what `wsm index` found"
+    counts = Counter(refusal.reason for refusal in refusals).most_common(_SHOWN_REASONS)
+    examples = {refusal.reason: refusal.message for refusal in reversed(refusals)}
+    return "refused were\n" + "\n".join(f"  {count} x {reason}, as: {examples[reason]}" for reason, count in counts)
 
 
 def _pending(config: PackConfig) -> list[str]:
@@ -96,7 +106,7 @@ def _pending(config: PackConfig) -> list[str]:
 def _require_complete(config: PackConfig) -> None:
     pending = _pending(config)
     if pending and not config.partial:
-        raise ConfigError(
+        raise UpstreamMissing(
             f"{len(pending)} units are pending, such as {pending[0]}; run `wsm index`, `wsm map` and `wsm encode` to "
             "their end, or pack what there is with --set partial=true"
         )
