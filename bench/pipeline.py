@@ -28,8 +28,8 @@ from wsm_data.schema.codec import CodecInfo
 from wsm_data.synth.config import SynthConfig
 from wsm_data.synth.writers import write_scene
 
-ROUNDS = 5
-SCENES = 8
+ROUNDS = 3
+SCENES = 6
 LAYOUTS = ("scene_folder", "scene_archive")
 SYNTH = {"scenes": SCENES, "trajectories": 2, "cameras": ("d435i",), "min_frames": 120, "max_frames": 200}
 
