@@ -28,10 +28,11 @@ from wsm_data.schema.codec import CodecInfo
 from wsm_data.synth.config import SynthConfig
 from wsm_data.synth.writers import write_scene
 
-ROUNDS = 3
-SCENES = 6
+ROUNDS = 2
+SCENES = 2
+TRAJECTORIES = 13  # as in the archive of InternData-N1 that was measured: 13 episodes, 1,811 frames
 LAYOUTS = ("scene_folder", "scene_archive")
-SYNTH = {"scenes": SCENES, "trajectories": 2, "cameras": ("d435i",), "min_frames": 120, "max_frames": 200}
+SYNTH = {"scenes": SCENES, "trajectories": TRAJECTORIES, "cameras": ("d435i",), "min_frames": 120, "max_frames": 200}
 
 
 class NoCodec:
@@ -140,7 +141,7 @@ def main() -> None:
     lines = [
         "# Index + encode without the codec, against a bare decode and resize loop",
         "",
-        f"{frames} frames (JPEG + 16-bit PNG) of 480x270 to 320x192 in {SCENES} scenes, medians of {ROUNDS} "
+        f"{frames} frames (JPEG + 16-bit PNG) of 480x270 to 320x192 in {SCENES} scenes of {TRAJECTORIES} trajectories, medians of {ROUNDS} "
         "interleaved rounds. Ours makes two passes and writes clips to disk; the bare loop reads each file once and "
         "keeps nothing. Archives hold the same files; the bare loop reads them from folders.",
         "",

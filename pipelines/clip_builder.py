@@ -9,7 +9,7 @@ from pipelines.gate import require_kept
 from pipelines.scene_view import SceneView
 from wsm_data.checks.depth_measured import check_depth_measured
 from wsm_data.codecs.base import VideoCodec
-from wsm_data.codecs.clip_video import depth_video, pad_frames, padded_length, rgb_video
+from wsm_data.codecs.clip_video import VideoMemory, depth_video, pad_frames, padded_length, rgb_video
 from wsm_data.codecs.depth import depth_m_from_latent_video, valid_share
 from wsm_data.codecs.quality import DEPTH_EDGES_M, CodecQuality, clip_quality, depth_error_by_range
 from wsm_data.errors import Reason
@@ -61,9 +61,13 @@ class ClipVideos:
 
 
 def read_videos(
-    record: EpisodeRecord, frames: EpisodeFrames, dataset: DatasetManifest, config: ClipConfig
+    record: EpisodeRecord,
+    frames: EpisodeFrames,
+    dataset: DatasetManifest,
+    config: ClipConfig,
+    memory: VideoMemory | None = None,
 ) -> ClipVideos:
-    """Decode, resize, normalise and pad the frames of a trajectory.
+    """Decode, resize, normalise and pad the frames of a trajectory, into `memory` where it is given.
 
     Raises:
         DataError: a frame does not decode, or a depth image has no measurement.
@@ -71,8 +75,8 @@ def read_videos(
     where = record.id.text
     length = padded_length(record.frame_count, config.still_frames)
     size = config.width, config.height
-    rgb = rgb_video(frames.rgb, *size, where, length)
-    depth, valid = depth_video(frames.depth, dataset.depth, config.depth_range, *size, where, length)
+    rgb = rgb_video(frames.rgb, *size, where, length, memory)
+    depth, valid = depth_video(frames.depth, dataset.depth, config.depth_range, *size, where, length, memory)
     require_kept(check_depth_measured(valid[: record.frame_count], where))
     return ClipVideos(rgb=rgb, depth=depth, depth_valid=valid)
 

@@ -17,6 +17,7 @@ from pipelines.source import IndexedSource, container_from_json, conventions_dig
 from pipelines.stage import Finished, Outcome, Settled, Stage, StageContext, Unit, refused
 from pipelines.upstream import done_outcomes, quarantine_of, require_stage
 from wsm_data.codecs.base import VideoCodec
+from wsm_data.codecs.clip_video import VideoMemory
 from wsm_data.codecs.registry import CodecConfig, describe_codec, make_codec
 from wsm_data.errors import ConfigError, DataError
 from wsm_data.files.atomic import write_text
@@ -148,14 +149,15 @@ def _prepare(
     """Read the trajectories of one container in one pass, on the map and as videos; the unusable come as outcomes."""
     units = {unit.id: unit for unit in batch}
     records = [one for one in read_records(records_path(config.index, scene.container.id)) if one.id.text in units]
+    # One clip at a time is encoded before the next is read; several at a time need memory each.
+    memory = VideoMemory() if config.codec.batch_clips == 1 else None
     for record, frames in iter_episode_frames(source.root, scene.container, records):
         unit = units[record.id.text]
         try:
             require_depth_agreement(record, frames, source.dataset)
             view = view_scene(record, scene_map, source.dataset, config.clip)
-            yield _Prepared(
-                unit=unit, record=record, view=view, videos=read_videos(record, frames, source.dataset, config.clip)
-            )
+            videos = read_videos(record, frames, source.dataset, config.clip, memory)
+            yield _Prepared(unit=unit, record=record, view=view, videos=videos)
         except DataError as error:
             yield refused(unit, error)
 

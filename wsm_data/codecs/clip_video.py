@@ -5,6 +5,7 @@ from typing import TypeVar
 
 import cv2
 import numpy as np
+from numpy.typing import DTypeLike
 
 from wsm_data.codecs.base import TEMPORAL_RATIO
 from wsm_data.codecs.depth import is_measured, log_depth_table
@@ -19,7 +20,32 @@ _COLOURS = (np.arange(256, dtype=np.float32) - _HALF_RANGE) / _HALF_RANGE
 """What each of the 256 levels becomes; float32 [256] in [-1, 1]."""
 
 
-def rgb_video(frames: Sequence[bytes], width: int, height: int, where: str, length: int | None = None) -> Float32Array:
+class VideoMemory:
+    """Memory that the videos of one trajectory after another are decoded into.
+
+    A clip's videos are some 200 MB; asking the system for new pages for each costs as much as decoding the frames.
+    """
+
+    def __init__(self) -> None:
+        self._held: dict[str, np.ndarray] = {}
+
+    def array(self, name: str, shape: tuple[int, ...], dtype: DTypeLike) -> np.ndarray:
+        """An array of undefined content that shares memory with the last one of this name."""
+        size = int(np.prod(shape))
+        held = self._held.get(name)
+        if held is None or held.dtype != np.dtype(dtype) or len(held) < size:
+            held = self._held[name] = np.empty(size, dtype)
+        return held[:size].reshape(shape)
+
+
+def rgb_video(
+    frames: Sequence[bytes],
+    width: int,
+    height: int,
+    where: str,
+    length: int | None = None,
+    memory: VideoMemory | None = None,
+) -> Float32Array:
     """Decode and resize the JPEG frames of an episode.
 
     Args:
@@ -28,6 +54,7 @@ def rgb_video(frames: Sequence[bytes], width: int, height: int, where: str, leng
         height: encoded height, px.
         where: the episode, for messages; the number of the frame is added to it.
         length: frames of the video, T where None; the last frame is repeated as in `pad_frames`, without a copy of all.
+        memory: where the video is put, and stays until the next one is; memory of its own where None.
 
     Returns:
         float32 [length, height, width, 3] in [-1, 1]: rgb / 127.5 - 1.
@@ -35,7 +62,8 @@ def rgb_video(frames: Sequence[bytes], width: int, height: int, where: str, leng
     Raises:
         DataError: FRAME_UNDECODABLE; FRAME_SIZE_MISMATCH where a frame's size differs from the first one's.
     """
-    video = np.empty((_padded_count(frames, length), height, width, 3), np.float32)
+    memory = memory or VideoMemory()
+    video = memory.array("rgb", (_padded_count(frames, length), height, width, 3), np.float32)
     decoded = (decode_rgb(data, _frame_name(where, "colour", index)) for index, data in enumerate(frames))
     for index, rgb_u8 in enumerate(_of_one_size(decoded, where, "colour")):
         cv2.LUT(resize_rgb(rgb_u8, width, height), _COLOURS, dst=video[index])
@@ -51,6 +79,7 @@ def depth_video(
     height: int,
     where: str,
     length: int | None = None,
+    memory: VideoMemory | None = None,
 ) -> tuple[Float32Array, BoolArray]:
     """Decode, resize and normalise the depth frames of an episode.
 
@@ -62,6 +91,7 @@ def depth_video(
         height: encoded height, px.
         where: the episode, for messages; the number of the frame is added to it.
         length: frames of the video, T where None; the last frame is repeated as in `pad_frames`, without a copy of all.
+        memory: where the video is put, and stays until the next one is; memory of its own where None.
 
     Returns:
         The log-depth video, float32 [length, height, width, 3] in [-1, 1], a read-only view that repeats one channel;
@@ -72,8 +102,9 @@ def depth_video(
             first one's.
     """
     normalised = log_depth_table(encoding, depth_range)
-    channel = np.empty((_padded_count(frames, length), height, width), np.float32)
-    valid = np.empty(channel.shape, bool)
+    memory = memory or VideoMemory()
+    channel = memory.array("depth", (_padded_count(frames, length), height, width), np.float32)
+    valid = memory.array("valid", channel.shape, np.bool_)
     decoded = (decode_depth(data, _frame_name(where, "depth", index)) for index, data in enumerate(frames))
     for index, raw_u16 in enumerate(_of_one_size(decoded, where, "depth")):
         codes = resize_depth(raw_u16, width, height)

@@ -5,7 +5,7 @@ import simplejpeg
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wsm_data.codecs.clip_video import depth_video, pad_frames, padded_length, rgb_video
+from wsm_data.codecs.clip_video import VideoMemory, depth_video, pad_frames, padded_length, rgb_video
 from wsm_data.codecs.dct import DctCodec
 from wsm_data.codecs.depth import log_depth_table
 from wsm_data.codecs.images import decode_rgb, resize_depth, resize_rgb
@@ -120,3 +120,21 @@ def test_a_padded_depth_video_still_holds_its_channel_once(depth_frames):
 def test_padding_to_less_is_refused(smooth_video):
     with pytest.raises(ValueError, match="found 13"):
         pad_frames(smooth_video, 9)
+
+
+def test_memory_that_is_used_again_gives_the_same_videos_for_longer_and_shorter_episodes(rgb_frames, depth_frames):
+    memory = VideoMemory()
+    for count in (3, 2, 3):
+        rgb = rgb_video(rgb_frames[:count], 64, 32, WHERE, 5, memory)
+        depth, valid = depth_video(depth_frames[:count], ENCODING, RANGE, 64, 32, WHERE, 5, memory)
+        assert np.array_equal(rgb, rgb_video(rgb_frames[:count], 64, 32, WHERE, 5))
+        fresh_depth, fresh_valid = depth_video(depth_frames[:count], ENCODING, RANGE, 64, 32, WHERE, 5)
+        assert np.array_equal(depth, fresh_depth)
+        assert np.array_equal(valid, fresh_valid)
+
+
+def test_memory_is_one_until_a_longer_episode_comes(rgb_frames):
+    memory = VideoMemory()
+    first = rgb_video(rgb_frames[:3], 64, 32, WHERE, None, memory)
+    second = rgb_video(rgb_frames[:2], 64, 32, WHERE, None, memory)
+    assert np.shares_memory(first, second)
