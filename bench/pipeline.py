@@ -141,7 +141,8 @@ def main() -> None:
     lines = [
         "# Index + encode without the codec, against a bare decode and resize loop",
         "",
-        f"{frames} frames (JPEG + 16-bit PNG) of 480x270 to 320x192 in {SCENES} scenes of {TRAJECTORIES} trajectories, medians of {ROUNDS} "
+        f"{frames} frames (JPEG + 16-bit PNG) of 480x270 to 320x192 in {SCENES} scenes of {TRAJECTORIES} "
+        f"trajectories, medians of {ROUNDS} "
         "interleaved rounds. Ours makes two passes and writes clips to disk; the bare loop reads each file once and "
         "keeps nothing. Archives hold the same files; the bare loop reads them from folders.",
         "",
