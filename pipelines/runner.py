@@ -139,14 +139,14 @@ def run_stage(
     with _full_disk_named(out), locked(out):
         remove_temporaries(out)
         job.ledger.update(_standing(out))
-        todo = _selected(job)
-        if todo or not _is_finished(job):
+        selected = _selected(job)
+        if selected or not _is_finished(job):
             write_stage_record(out, record)  # unfinished from here to the end, for whoever reads it
-            _work(job, todo)
+            _work(job, selected)
             _finish(job)
         else:
             _keep_record_current(job)
-    return _report(job, todo, time.monotonic() - started)
+    return _report(job, selected, time.monotonic() - started)
 
 
 def _report(job: _Job, ran: Sequence[Unit], seconds: float) -> StageReport:
@@ -244,17 +244,17 @@ def _is_settled(job: _Job, unit: Unit) -> bool:
     return entry.outcome.state != REFUSED or not job.options.retry_refused
 
 
-def _work(job: _Job, todo: Sequence[Unit]) -> None:
-    again = {unit.id for unit in todo}
+def _work(job: _Job, selected: Sequence[Unit]) -> None:
+    again = {unit.id for unit in selected}
     standing = [outcome for unit, outcome in job.settled().outcomes.items() if unit not in again]
     count = replace(count_refusals(standing, len(job.units), job.stage.parts_fact), found=None)
     _keep_to_budget(job, count)
     work = partial(_process_batch, job.stage, job.config, StageContext(out=job.out))
-    hidden = job.options.quiet or not todo
+    hidden = job.options.quiet or not selected
     with (
-        tqdm(total=len(todo), desc=job.stage.name, unit="unit", disable=hidden, dynamic_ncols=True) as bar,
+        tqdm(total=len(selected), desc=job.stage.name, unit="unit", disable=hidden, dynamic_ncols=True) as bar,
         ledger_appender(job.out) as append,
-        closing(job.engine(_batches(todo), work, job.options.workers)) as outcomes,  # no worker outlives the lock
+        closing(job.engine(_batches(selected), work, job.options.workers)) as outcomes,  # no worker outlives the lock
     ):
         for outcome in outcomes:
             job.ledger[outcome.unit] = append(LedgerEntry(key=job.keys[outcome.unit], outcome=outcome))

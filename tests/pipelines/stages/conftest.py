@@ -157,3 +157,10 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Pipeline:
     pipeline = build(tmp_path_factory.mktemp("finished"), None, {})
     pipeline.run_to("report")
     return pipeline
+
+
+@pytest.fixture
+def mapped(make_pipeline):
+    pipeline = make_pipeline()
+    pipeline.run_to("map")
+    return pipeline

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from box_room import (
     MANIFEST_TOML,
-    RGB,
     UPSTAIRS,
     along_x,
     lengths_bytes,
 )
+from encode_scenes import DEN, HALL, UNITS, ZED, again, frame
 
 from pipelines.clip_config import ClipConfig
 from pipelines.episode_table import read_episodes
@@ -25,33 +25,12 @@ from wsm_data.files.typed_toml import build_config
 from wsm_data.schema.identity import EpisodeId
 from wsm_data.shards.fragment import fragment_path, read_fragment_info
 
-DEN, HALL, ZED = "box_d435i/den", "box_d435i/hall", "box_zed/hall"
-UNITS = [f"{DEN}/000000", f"{HALL}/000000", f"{HALL}/000001", f"{HALL}/000002", f"{ZED}/000000"]
-
-
-@pytest.fixture
-def mapped(make_pipeline):
-    pipeline = make_pipeline()
-    pipeline.run_to("map")
-    return pipeline
-
-
-def frame(pipeline, scene, number, kind=RGB, episode=0):
-    ending = "jpg" if kind == RGB else "png"
-    return pipeline.source / scene / kind / f"episode_{episode:06d}_{number:03d}.{ending}"
-
 
 def keep_cloud(pipeline, scene, drives):
     """Write drives into a scene without touching its cloud."""
     cloud = (pipeline.source / scene / "meta/pointcloud.ply").read_bytes()
     pipeline.write(scene, drives)
     (pipeline.source / scene / "meta/pointcloud.ply").write_bytes(cloud)
-
-
-def again(pipeline):
-    """Run what comes before encode again."""
-    for stage in ("index", "split", "map"):
-        pipeline.run(stage)
 
 
 def clip_digests(pipeline):

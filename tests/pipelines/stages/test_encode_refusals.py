@@ -8,33 +8,13 @@ from box_room import (
     scene_files,
     write_archive,
 )
+from encode_scenes import HALL, ZED, again, frame
 
 from pipelines.folder import read_stage_record
 from pipelines.layout import clips_folder
 from wsm_data.errors import IntegrityError
 from wsm_data.files.jsonlines import read_lines
 from wsm_data.shards.fragment import read_fragment_info
-
-DEN, HALL, ZED = "box_d435i/den", "box_d435i/hall", "box_zed/hall"
-UNITS = [f"{DEN}/000000", f"{HALL}/000000", f"{HALL}/000001", f"{HALL}/000002", f"{ZED}/000000"]
-
-
-@pytest.fixture
-def mapped(make_pipeline):
-    pipeline = make_pipeline()
-    pipeline.run_to("map")
-    return pipeline
-
-
-def frame(pipeline, scene, number, kind=RGB, episode=0):
-    ending = "jpg" if kind == RGB else "png"
-    return pipeline.source / scene / kind / f"episode_{episode:06d}_{number:03d}.{ending}"
-
-
-def again(pipeline):
-    """Run what comes before encode again."""
-    for stage in ("index", "split", "map"):
-        pipeline.run(stage)
 
 
 def refused_here(make_pipeline, drives, damage=lambda pipeline: None):
