@@ -1,0 +1,162 @@
+"""Settings of a loader: what is read, in which order, how it becomes batches, and how it is read.
+
+Order and batches decide what a training run sees, so they are part of the state that a checkpoint keeps. How the bytes
+are read (threads, workers, caches) never changes what is delivered.
+"""
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+MAX_CHUNK_LATENTS = 4
+"""Largest chunk size K (paper, implementation details: K is drawn from 1 to 4)."""
+
+
+class Remainder(StrEnum):
+    """What becomes of the rows that do not fill the last global step of an epoch."""
+
+    DROP = "drop"
+    REPEAT = "repeat"
+    PAD = "pad"
+
+
+class Arrangement(StrEnum):
+    """How clips of different lengths share a batch."""
+
+    PLAIN = "plain"
+    BUCKET = "bucket"
+    PACK = "pack"
+
+
+class Verify(StrEnum):
+    """When the checksum of a member is compared."""
+
+    ALWAYS = "always"
+    FIRST = "first"
+    NEVER = "never"
+
+
+class RemoteAccess(StrEnum):
+    """How shards behind a URL are read."""
+
+    RANGES = "ranges"
+    SHARDS = "shards"
+
+
+@dataclass(frozen=True, kw_only=True)
+class SourceConfig:
+    """Clips that a loader draws from.
+
+    Attributes:
+        release: folder or URL of the release.
+        selection: name of a selection of the release, or path of a selection file; empty for all clips of the split.
+        split: split of the clips; empty for all splits.
+        weight: passes over the source in an epoch. With 0.5, one epoch brings one half of the clips and the next one
+            the other half; with 2, every clip comes twice.
+    """
+
+    release: str
+    selection: str = ""
+    split: str = "train"
+    weight: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not self.weight > 0:
+            raise ValueError(f"weight must be above 0, found {self.weight}; leave the source out instead")
+
+
+@dataclass(frozen=True, kw_only=True)
+class OrderConfig:
+    """Which clips make up which global step: with the releases, a pure function of seed and epoch.
+
+    Attributes:
+        seed: of the order, and of the chunk sizes.
+        shuffle: whether clips are permuted; otherwise they come in the order of the index.
+        block_clips: clips of a shard that stay together before the shuffle within a window; 0: the whole shard.
+        window_blocks: blocks whose clips are shuffled among one another.
+        global_batch: rows of one step over all ranks.
+        remainder: what becomes of rows that do not fill a step.
+        max_latents: longest sequence, in latents; longer clips are cut to a prefix. 0: whole clips.
+        arrangement: one clip a row (`plain`), rows of similar length in a step (`bucket`), or several clips in rows of
+            `row_latents` (`pack`).
+        pool: steps whose rows `bucket` sorts by length, or clips among which `pack` looks for what fits.
+        row_latents: length of a packed row, in latents; only for `pack`.
+        chunk_sizes: what the chunk size K is drawn from, once for every sequence.
+    """
+
+    seed: int = 0
+    shuffle: bool = True
+    block_clips: int = 0
+    window_blocks: int = 4
+    global_batch: int = 8
+    remainder: Remainder = Remainder.DROP
+    max_latents: int = 0
+    arrangement: Arrangement = Arrangement.PLAIN
+    pool: int = 32
+    row_latents: int = 0
+    chunk_sizes: tuple[int, ...] = tuple(range(1, MAX_CHUNK_LATENTS + 1))
+
+    def __post_init__(self) -> None:
+        for name in ("window_blocks", "global_batch", "pool"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"{name} must be at least 1, found {getattr(self, name)}")
+        for name in ("seed", "block_clips", "max_latents", "row_latents"):
+            if getattr(self, name) < 0:
+                raise ValueError(f"{name} must not be negative, found {getattr(self, name)}")
+        if (self.arrangement is Arrangement.PACK) != (self.row_latents > 0):
+            raise ValueError("row_latents belongs to arrangement = pack, and must be above 0 there")
+        if not self.chunk_sizes or min(self.chunk_sizes) < 1:
+            raise ValueError(f"chunk_sizes must be numbers of at least 1, found {self.chunk_sizes}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReadConfig:
+    """How the bytes of a batch get into memory; none of this changes what is delivered.
+
+    Attributes:
+        verify: when checksums are compared: `first` time a process reads a clip, `always`, or `never`.
+        threads: threads that read ahead in the training process; 0: everything in the caller's thread.
+        workers: worker processes in place of threads; every batch is copied between processes then.
+        prefetch_batches: batches that are read ahead.
+        standardise: subtract mean and divide by standard deviation; otherwise latents come as they are stored.
+        dtype: dtype of the latents of a batch: `float32`, `bfloat16`, or `float16`.
+        device: where batches are delivered, as torch spells it.
+        pin_memory: read into page-locked memory, so that the transfer to a GPU runs beside the training step.
+        access: for URLs: single ranges, or whole shards into the cache.
+        cache_dir: folder of the cache of whole shards; needed for `access = shards`.
+        cache_gib: most bytes the cache may hold, GiB.
+        fetch_threads: requests to a store at the same time.
+        attempts: how often a request is tried before the run stops.
+        first_backoff_s: pause after the first failed attempt, s; it doubles with each further one.
+    """
+
+    verify: Verify = Verify.FIRST
+    threads: int = 2
+    workers: int = 0
+    prefetch_batches: int = 3
+    standardise: bool = True
+    dtype: str = "float32"
+    device: str = "cpu"
+    pin_memory: bool = False
+    access: RemoteAccess = RemoteAccess.RANGES
+    cache_dir: str = ""
+    cache_gib: float = 50.0
+    fetch_threads: int = 8
+    attempts: int = 6
+    first_backoff_s: float = 0.25
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoaderConfig:
+    """Everything a loader is made from.
+
+    Attributes:
+        sources: what is mixed.
+        order: which clips make up which step.
+        read: how they are read.
+        ledger: folder in which every delivered step is recorded; empty for none.
+    """
+
+    sources: tuple[SourceConfig, ...]
+    order: OrderConfig = field(default_factory=OrderConfig)
+    read: ReadConfig = field(default_factory=ReadConfig)
+    ledger: str = ""
