@@ -1,0 +1,223 @@
+"""Selections: which clips of a release were chosen, how hard each is and why, as a file beside the shards.
+
+A selection names its release by digest. It changes no shard: a loader that is given one reads the clips it lists.
+"""
+
+import json
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
+
+from wsm_data.errors import ConfigError, IntegrityError
+from wsm_data.files.atomic import atomic_file
+from wsm_data.files.jsonlines import canonical_json
+from wsm_data.files.stores import Store, open_store
+from wsm_data.schema.arrays import Float64Array
+from wsm_data.shards.index import IndexTable
+
+SELECTION_FOLDER = "selections"
+SELECTION_SUFFIX = ".parquet"
+SELECTION_VERSION = 1
+_METADATA = b"wsm.selection"
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
+_SCHEMA = pa.schema([("key", pa.string()), ("rank", pa.int64()), ("score", pa.float64()), ("why", pa.string())])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Selection:
+    """Clips of a release in the order of their difficulty.
+
+    Attributes:
+        name: name of the selection.
+        release_digest: digest of the release (`wsm_data.shards.manifest.release_digest`).
+        rule: every setting by which the clips were chosen; JSON values.
+        command: the command that writes these bytes again.
+        keys: key of each clip, hardest first; no key twice.
+        scores: difficulty of each clip under the rule, finite, larger is harder; float64 [clips].
+        why: which scores made each clip hard, as text.
+    """
+
+    name: str
+    release_digest: str
+    rule: Mapping[str, Any]
+    command: str
+    keys: pa.StringArray
+    scores: Float64Array
+    why: pa.StringArray
+
+    def __post_init__(self) -> None:
+        require_selection_name(self.name)
+        if not len(self.keys) == len(self.scores) == len(self.why):
+            raise ValueError(
+                f"columns must be of one length, found {[len(self.keys), len(self.scores), len(self.why)]}"
+            )
+        if self.keys.null_count or pc.count_distinct(self.keys).as_py() != len(self.keys):
+            raise ValueError("every clip must be listed once")
+        if not np.isfinite(self.scores).all():
+            raise ValueError("scores must be finite")
+
+    def __len__(self) -> int:
+        return len(self.keys)
+
+    @property
+    def ranks(self) -> np.ndarray:
+        """1 for the hardest clip, 2 for the next; int64 [clips]."""
+        return np.arange(1, len(self) + 1, dtype=np.int64)
+
+    def rows_of(self, index: IndexTable) -> np.ndarray:
+        """Rows of the release's index that the selection lists, ascending; int64 [clips].
+
+        Raises:
+            IntegrityError: a clip is not in the index.
+        """
+        rows = pc.index_in(self.keys, value_set=index.table["key"].combine_chunks())
+        if rows.null_count:
+            missing = self.keys.filter(pc.is_null(rows))
+            raise IntegrityError(
+                f"selection {self.name} lists {len(missing)} clips that its release does not have, such as "
+                f"{missing[0].as_py()}; select again"
+            )
+        return np.sort(rows.to_numpy()).astype(np.int64)
+
+
+def require_selection_name(name: str) -> str:
+    """The name, where it can be that of a selection.
+
+    Raises:
+        ValueError: it is not made of letters, digits, `_`, `-` and `.`, or ends like a file of a selection.
+    """
+    if not _NAME.fullmatch(name) or name.endswith(SELECTION_SUFFIX):
+        raise ValueError(
+            f"the name of a selection must be of letters, digits, _, - and ., such as hard, found {name!r}"
+        )
+    return name
+
+
+def selection_path(name: str) -> str:
+    """Where a selection stands in its release, relative to the release's folder."""
+    return f"{SELECTION_FOLDER}/{name}{SELECTION_SUFFIX}"
+
+
+def selection_names(release: Store) -> list[str]:
+    """Names of the selections that stand in a release, sorted."""
+    try:
+        files = open_store(f"{release.root}/{SELECTION_FOLDER}").names()
+    except FileNotFoundError:
+        return []
+    return [file.removesuffix(SELECTION_SUFFIX) for file in files if is_selection_file(file)]
+
+
+def is_selection_file(text: str) -> bool:
+    """Whether a text is a path of a selection file rather than the name of a selection."""
+    return text.endswith(SELECTION_SUFFIX) and not Path(text).name.startswith(".")
+
+
+def write_selection(path: Path, selection: Selection) -> None:
+    """Write a selection atomically; equal selections and an equal pyarrow give equal bytes."""
+    stated = {
+        "version": SELECTION_VERSION,
+        "name": selection.name,
+        "release_digest": selection.release_digest,
+        "rule": dict(selection.rule),
+        "command": selection.command,
+        "clips": len(selection),
+    }
+    schema = _SCHEMA.with_metadata({_METADATA: canonical_json(stated)})
+    columns = [selection.keys, pa.array(selection.ranks), pa.array(selection.scores), selection.why]
+    with atomic_file(path) as file:
+        pq.write_table(
+            pa.Table.from_arrays(columns, schema=schema),
+            file,
+            write_page_checksum=True,
+            compression="zstd",
+            use_dictionary=["why"],
+        )
+
+
+def read_selection(release: Store | str | Path, name: str, release_digest: str) -> Selection:
+    """Read a selection of a release.
+
+    Args:
+        release: the release, or its folder or URL.
+        name: name of a selection that stands in the release, or path or URL of a file that ends in `.parquet`.
+        release_digest: digest of the release that is to be read.
+
+    Raises:
+        ConfigError: there is no such selection, or it was made from another release.
+        IntegrityError: the file is damaged, or is no selection of this version.
+    """
+    store = open_store(release) if isinstance(release, str | Path) else release
+    where, data = _stored(store, name)
+    selection = parse_selection(data, where)
+    if selection.release_digest != release_digest:
+        raise ConfigError(
+            f"{where} was made from the release with digest {selection.release_digest}, but the release at "
+            f"{store.root} has digest {release_digest}; read it with that release, or select again: "
+            f"{selection.command}"
+        )
+    return selection
+
+
+def parse_selection(data: bytes, where: str) -> Selection:
+    """Read a selection of any release from the bytes of its file.
+
+    Args:
+        data: content of the file.
+        where: its place, for messages.
+
+    Raises:
+        IntegrityError: the file is damaged, or is no selection of this version.
+    """
+    try:
+        table = pq.ParquetFile(pa.BufferReader(data), page_checksum_verification=True).read()
+        stated = json.loads((table.schema.metadata or {}).get(_METADATA, b"null"))
+        return _parse(table, stated)
+    except (pa.ArrowException, OSError, ValueError, KeyError) as error:
+        raise IntegrityError(f"{where} must be a selection, but: {error}; restore it or select again") from error
+
+
+def _parse(table: pa.Table, stated: Any) -> Selection:
+    if not isinstance(stated, dict):
+        raise ValueError(f"its metadata has no {_METADATA.decode()}")
+    if stated["version"] != SELECTION_VERSION:
+        raise ValueError(f"version must be {SELECTION_VERSION}, found {stated['version']!r}; use a matching wsm")
+    if not table.schema.equals(_SCHEMA) or table.num_rows != stated["clips"]:
+        raise ValueError(f"it must have {stated['clips']} rows of {_SCHEMA.names}, found {table.num_rows}")
+    selection = Selection(
+        name=stated["name"],
+        release_digest=stated["release_digest"],
+        rule=stated["rule"],
+        command=stated["command"],
+        keys=_whole(table["key"]),
+        scores=table["score"].to_numpy(),
+        why=_whole(table["why"]),
+    )
+    if not np.array_equal(table["rank"].to_numpy(), selection.ranks):
+        raise ValueError("ranks must count from 1")
+    return selection
+
+
+def _whole(column: pa.ChunkedArray) -> pa.StringArray:
+    return pa.concat_arrays(column.chunks) if column.num_chunks else pa.array([], pa.string())
+
+
+def _stored(release: Store, name: str) -> tuple[str, bytes]:
+    """Place and content of the file that a name or a path stands for."""
+    if is_selection_file(name):
+        folder, slash, file = name.rpartition("/")
+        store, listed = open_store(folder + slash if slash else "."), ""
+    else:
+        store, file = release, selection_path(name)
+        listed = f"; it has {', '.join(selection_names(release)) or 'none'}"
+    where = f"{store.root.rstrip('/')}/{file}"
+    try:
+        return where, store.read(file)
+    except FileNotFoundError as error:
+        raise ConfigError(f"there is no selection at {where}{listed}; make one with `wsm select`") from error
