@@ -6,6 +6,8 @@ MANIFEST_NAME = "dataset.json"
 INDEX_NAME = "index.parquet"
 INVENTORY_NAME = "inventory.parquet"
 QUARANTINE_NAME = "quarantine.jsonl"
+SCORES_NAME = "scores.parquet"
+SELECTIONS_FOLDER = "selections"
 
 TRAIN_SPLIT = "train"
 """The split over which the statistics of the latents are taken."""

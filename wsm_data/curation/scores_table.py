@@ -1,0 +1,251 @@
+"""scores.parquet: every score of every clip of one release, column by column.
+
+One row per clip, in the order of the release's index: a text column `key` and a float64 column per score. The file's
+metadata holds, under `wsm.scores`, what each score is and the digest of the release it belongs to. An absent value is
+null in the file and NaN in memory, and is taken only for scores that say what their absence means.
+"""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
+from enum import StrEnum
+from pathlib import Path
+from typing import Any
+
+import fsspec
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
+
+from wsm_data.errors import ConfigError, IntegrityError
+from wsm_data.files.atomic import atomic_file
+from wsm_data.files.jsonlines import canonical_json
+from wsm_data.files.typed_toml import did_you_mean
+from wsm_data.schema.arrays import Float64Array
+
+SCORES_VERSION = 1
+KEY_COLUMN = "key"
+_METADATA_KEY = b"wsm.scores"
+_ROW_GROUP_ROWS = 1 << 20
+_SHOWN_CLIPS = 3
+
+
+class Direction(StrEnum):
+    """Which end of a score is hard."""
+
+    HIGHER = "higher is harder"
+    LOWER = "lower is harder"
+    NEUTRAL = "neutral"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ScorerInfo:
+    """What a score says of itself.
+
+    Attributes:
+        name: name of its column.
+        unit: unit of its values, such as `m`, `rad/m`, `share` or `ratio`.
+        direction: which end is hard.
+        summary: one line: what is measured.
+        version: raised when the same clip gets another value.
+        absent: what a missing value means; empty where every clip has one.
+    """
+
+    name: str
+    unit: str
+    direction: Direction
+    summary: str
+    version: int = 1
+    absent: str = ""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ScoreTable:
+    """Scores in memory, column by column.
+
+    Attributes:
+        release_digest: digest of the release they belong to.
+        scorers: the scores, in the order of their columns.
+        keys: keys of the clips, in the order of the release's index; text [N].
+        columns: by the name of the score, float64 [N]; NaN where the clip has none.
+    """
+
+    release_digest: str
+    scorers: tuple[ScorerInfo, ...]
+    keys: pa.Array
+    columns: Mapping[str, Float64Array]
+
+    def __post_init__(self) -> None:
+        names = [one.name for one in self.scorers]
+        if len(set(names)) != len(names) or KEY_COLUMN in names or names != list(self.columns):
+            raise ValueError(f"columns must be those of the scorers, once each, {names}, found {list(self.columns)}")
+        for name, values in self.columns.items():
+            if values.dtype != np.float64 or values.shape != (len(self.keys),):
+                raise ValueError(
+                    f"{name} must be float64 [{len(self.keys)}], found {values.dtype} {list(values.shape)}"
+                )
+
+    def __len__(self) -> int:
+        return len(self.keys)
+
+
+def write_scores(path: Path, table: ScoreTable) -> None:
+    """Write a table atomically; equal tables and an equal pyarrow give equal bytes.
+
+    Raises:
+        ConfigError: a value is infinite, or absent where the score says it is always there; names score and clip.
+    """
+    require_sound_values(table, str(path))
+    arrays = [table.keys, *(pa.array(values, from_pandas=True) for values in table.columns.values())]
+    stored = pa.Table.from_arrays(arrays, schema=_schema(table.release_digest, table.scorers))
+    with atomic_file(path) as file:
+        pq.write_table(
+            stored,
+            file,
+            write_page_checksum=True,
+            row_group_size=_ROW_GROUP_ROWS,
+            compression={name: "zstd" if name == KEY_COLUMN else "none" for name in stored.column_names},
+            use_dictionary=False,
+        )
+
+
+def read_scores(
+    location: str | Path,
+    *,
+    release_digest: str,
+    release_keys: pa.ChunkedArray | None = None,
+    only: Sequence[str] | None = None,
+) -> ScoreTable:
+    """Read the scores of one release.
+
+    Args:
+        location: path or URL of the file.
+        release_digest: digest of the release they must belong to.
+        release_keys: the column `key` of its index. Where it is given, every clip must have its row, in this order, and
+            a refusal of another release says which clips differ.
+        only: names of the scores to read; None reads all.
+
+    Raises:
+        ConfigError: there is no such file, it belongs to another release, a clip has no scores, a score that is asked
+            for is not there, or a value is NaN, infinite, or absent where the score is always there.
+        IntegrityError: the file is damaged, or no table of scores of this version.
+    """
+    where = str(location)
+    stored, found, scorers = _load(where, only)
+    keys = stored[KEY_COLUMN]
+    _require_release(where, found, release_digest, keys, release_keys)
+    columns = {}
+    for one in scorers:
+        _require_no_nan(stored[one.name], one, keys, where)
+        columns[one.name] = np.asarray(stored[one.name].to_numpy(), np.float64)
+    keys = pa.concat_arrays(keys.chunks) if keys.num_chunks != 1 else keys.chunk(0)
+    table = ScoreTable(release_digest=found, scorers=scorers, keys=keys, columns=columns)
+    require_sound_values(table, where)
+    return table
+
+
+def require_sound_values(table: ScoreTable, where: str) -> None:
+    """Check that no value is infinite, and none is absent but where its score allows that.
+
+    Raises:
+        ConfigError: names score and clip.
+    """
+    for one in table.scorers:
+        values = table.columns[one.name]
+        bad = np.isinf(values) if one.absent else ~np.isfinite(values)
+        if bad.any():
+            place = int(bad.argmax())
+            found = "no value" if np.isnan(values[place]) else str(values[place])
+            raise ConfigError(
+                f"{where}: the score {one.name} of clip {table.keys[place].as_py()} must be a number, found {found}; "
+                f"{int(bad.sum())} clips are like this. Run `wsm score` again"
+            )
+
+
+def _schema(release_digest: str, scorers: Sequence[ScorerInfo]) -> pa.Schema:
+    record = {
+        "version": SCORES_VERSION,
+        "release_digest": release_digest,
+        "scorers": [asdict(one) for one in scorers],
+    }
+    columns = [(KEY_COLUMN, pa.string()), *((one.name, pa.float64()) for one in scorers)]
+    return pa.schema(columns, metadata={_METADATA_KEY: canonical_json(record)})
+
+
+def _load(where: str, only: Sequence[str] | None) -> tuple[pa.Table, str, tuple[ScorerInfo, ...]]:
+    """The stored columns, the digest of their release, and the scores that were asked for."""
+    filesystem, path = fsspec.core.url_to_fs(where)
+    try:
+        with filesystem.open(path, "rb") as handle, pq.ParquetFile(handle, page_checksum_verification=True) as file:
+            release_digest, scorers = _parse_metadata(file.schema_arrow)
+            chosen = _chosen(scorers, only, where)
+            return file.read([KEY_COLUMN, *(one.name for one in chosen)]), release_digest, chosen
+    except FileNotFoundError as error:
+        raise ConfigError(f"there are no scores at {where}; run `wsm score RELEASE` first") from error
+    except (pa.ArrowException, OSError, ValueError, TypeError, KeyError) as error:
+        raise IntegrityError(f"{where} must be a table of scores, but: {error}; run `wsm score` again") from error
+
+
+def _parse_metadata(schema: pa.Schema) -> tuple[str, tuple[ScorerInfo, ...]]:
+    record = json.loads((schema.metadata or {}).get(_METADATA_KEY, b"{}"))
+    if record.get("version") != SCORES_VERSION:
+        raise ValueError(f"its version must be {SCORES_VERSION}, found {record.get('version')!r}; use a matching wsm")
+    scorers = tuple(_parse_info(one) for one in record["scorers"])
+    wanted = _schema(record["release_digest"], scorers)
+    if schema != wanted:
+        raise ValueError(f"its columns must be {wanted.names} of text and float64, found {schema.names}")
+    return str(record["release_digest"]), scorers
+
+
+def _parse_info(record: Mapping[str, Any]) -> ScorerInfo:
+    names = {field.name for field in fields(ScorerInfo)}
+    if set(record) != names:
+        raise ValueError(f"a score must say {sorted(names)} of itself, found {sorted(record)}")
+    return ScorerInfo(**{**record, "direction": Direction(record["direction"])})
+
+
+def _chosen(scorers: Sequence[ScorerInfo], only: Sequence[str] | None, where: str) -> tuple[ScorerInfo, ...]:
+    by_name = {one.name: one for one in scorers}
+    for name in only or ():
+        if name not in by_name:
+            raise ConfigError(f"{where} has no score {name!r}; {did_you_mean(name, by_name)}")
+    return tuple(one for one in scorers if only is None or one.name in only)
+
+
+def _require_release(
+    where: str, found: str, wanted: str, keys: pa.ChunkedArray, release_keys: pa.ChunkedArray | None
+) -> None:
+    same_clips = release_keys is None or keys.equals(release_keys.cast(pa.string()))
+    if found == wanted and same_clips:
+        return
+    what = "another release" if found != wanted else "these clips"
+    lines = [
+        f"{where} must hold the scores of this release, and it is of {what}:",
+        f"  release digest: {found} -> {wanted}",
+    ]
+    if release_keys is not None:
+        lines += key_differences(keys, release_keys)
+    raise ConfigError("\n".join([*lines, "Run `wsm score` on this release"]))
+
+
+def key_differences(old: pa.ChunkedArray, new: pa.ChunkedArray) -> list[str]:
+    """Lines that say which clips two lists of keys do not share, and whether their order differs."""
+    lines = [f"  clips: {len(old)} -> {len(new)}"]
+    for text, here, there in (("gone", old, new), ("added", new, old)):
+        other = here.filter(pc.invert(pc.is_in(here, value_set=there)))
+        if len(other):
+            shown = ", ".join(other.slice(0, _SHOWN_CLIPS).to_pylist())
+            lines.append(f"  {text}: {len(other)}, such as {shown}")
+    return lines if len(lines) > 1 or len(old) != len(new) else [*lines, "  the clips are the same"]
+
+
+def _require_no_nan(values: pa.ChunkedArray, one: ScorerInfo, keys: pa.ChunkedArray, where: str) -> None:
+    """NaN is no way to store that a value is absent: whoever wrote it computed something wrong."""
+    nan = pc.fill_null(pc.is_nan(values), False)
+    if pc.any(nan).as_py():
+        place = pc.index(nan, True).as_py()
+        raise ConfigError(
+            f"{where}: the score {one.name} of clip {keys[place].as_py()} must be a number, found NaN; "
+            f"{pc.sum(nan).as_py()} clips are like this. Run `wsm score` again, or correct what wrote the file"
+        )
