@@ -1,12 +1,14 @@
 """scores.parquet: every score of every clip of one release, column by column.
 
-One row per clip, in the order of the release's index: a text column `key` and a float64 column per score. The file's
-metadata holds, under `wsm.scores`, what each score is and the digest of the release it belongs to. An absent value is
-null in the file and NaN in memory, and is taken only for scores that say what their absence means.
+One row per clip, in the order of the release's index: a text column `key`, the outline of the path, and a float64
+column per score. The file's metadata holds, under `wsm.scores`, what each score is and the digest of the release it
+belongs to. An absent value is null in the file and NaN in memory, and is taken only for scores that say what their
+absence means.
 """
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, fields
 from enum import StrEnum
 from pathlib import Path
@@ -17,15 +19,19 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
+from numpy.typing import NDArray
 
 from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.files.atomic import atomic_file
 from wsm_data.files.jsonlines import canonical_json
 from wsm_data.files.typed_toml import did_you_mean
-from wsm_data.schema.arrays import Float64Array
+from wsm_data.schema.arrays import Float32Array, Float64Array, require_array
 
 SCORES_VERSION = 1
-KEY_COLUMN = "key"
+KEY_COLUMN, PATH_COLUMN = "key", "path_xy_m"
+PATH_POINTS = 32
+"""Points of a path's outline."""
+
 _METADATA_KEY = b"wsm.scores"
 _ROW_GROUP_ROWS = 1 << 20
 _SHOWN_CLIPS = 3
@@ -78,7 +84,7 @@ class ScoreTable:
 
     def __post_init__(self) -> None:
         names = [one.name for one in self.scorers]
-        if len(set(names)) != len(names) or KEY_COLUMN in names or names != list(self.columns):
+        if len(set(names)) != len(names) or {KEY_COLUMN, PATH_COLUMN} & set(names) or names != list(self.columns):
             raise ValueError(f"columns must be those of the scorers, once each, {names}, found {list(self.columns)}")
         for name, values in self.columns.items():
             if values.dtype != np.float64 or values.shape != (len(self.keys),):
@@ -90,14 +96,21 @@ class ScoreTable:
         return len(self.keys)
 
 
-def write_scores(path: Path, table: ScoreTable) -> None:
+def write_scores(path: Path, table: ScoreTable, paths_xy_m: Float32Array) -> None:
     """Write a table atomically; equal tables and an equal pyarrow give equal bytes.
+
+    Args:
+        path: where to.
+        table: the scores.
+        paths_xy_m: outlines of the clips' paths (`curation.path_outline`), world, m; float32 [N, 32, 2].
 
     Raises:
         ConfigError: a value is infinite, or absent where the score says it is always there; names score and clip.
     """
     require_sound_values(table, str(path))
-    arrays = [table.keys, *(pa.array(values, from_pandas=True) for values in table.columns.values())]
+    require_array("paths_xy_m", paths_xy_m, np.float32, (len(table), PATH_POINTS, 2))
+    paths = pa.FixedSizeListArray.from_arrays(pa.array(paths_xy_m.reshape(-1)), 2 * PATH_POINTS)
+    arrays = [table.keys, paths, *(pa.array(values, from_pandas=True) for values in table.columns.values())]
     stored = pa.Table.from_arrays(arrays, schema=_schema(table.release_digest, table.scorers))
     with atomic_file(path) as file:
         pq.write_table(
@@ -145,6 +158,35 @@ def read_scores(
     return table
 
 
+def read_paths(location: str | Path, rows: NDArray[np.int64]) -> Float32Array:
+    """Read the outlines of some clips' paths, in constant memory beside what is returned.
+
+    Args:
+        location: path or URL of a file of scores.
+        rows: numbers of its rows, in any order; int64 [M].
+
+    Returns:
+        Points evenly spaced along each path, first and last included, world, m; float32 [M, 32, 2].
+
+    Raises:
+        ConfigError: there is no such file.
+        IntegrityError: it is damaged, or no table of scores of this version.
+    """
+    found = np.empty((len(rows), PATH_POINTS, 2), np.float32)
+    first = 0
+    with _open(str(location)) as file:
+        _parse_metadata(file.schema_arrow)
+        for group in range(file.num_row_groups):
+            count = file.metadata.row_group(group).num_rows
+            inside = np.flatnonzero((rows >= first) & (rows < first + count))
+            if len(inside):
+                stored = file.read_row_group(group, [PATH_COLUMN])[PATH_COLUMN].combine_chunks()
+                values = stored.flatten().to_numpy(zero_copy_only=False).reshape(count, PATH_POINTS, 2)
+                found[inside] = values[rows[inside] - first]
+            first += count
+    return found
+
+
 def require_sound_values(table: ScoreTable, where: str) -> None:
     """Check that no value is infinite, and none is absent but where its score allows that.
 
@@ -169,18 +211,25 @@ def _schema(release_digest: str, scorers: Sequence[ScorerInfo]) -> pa.Schema:
         "release_digest": release_digest,
         "scorers": [asdict(one) for one in scorers],
     }
-    columns = [(KEY_COLUMN, pa.string()), *((one.name, pa.float64()) for one in scorers)]
+    columns = [(KEY_COLUMN, pa.string()), (PATH_COLUMN, pa.list_(pa.float32(), 2 * PATH_POINTS))]
+    columns += [(one.name, pa.float64()) for one in scorers]
     return pa.schema(columns, metadata={_METADATA_KEY: canonical_json(record)})
 
 
 def _load(where: str, only: Sequence[str] | None) -> tuple[pa.Table, str, tuple[ScorerInfo, ...]]:
     """The stored columns, the digest of their release, and the scores that were asked for."""
+    with _open(where) as file:
+        release_digest, scorers = _parse_metadata(file.schema_arrow)
+        chosen = _chosen(scorers, only, where)
+        return file.read([KEY_COLUMN, *(one.name for one in chosen)]), release_digest, chosen
+
+
+@contextmanager
+def _open(where: str) -> Iterator[pq.ParquetFile]:
     filesystem, path = fsspec.core.url_to_fs(where)
     try:
         with filesystem.open(path, "rb") as handle, pq.ParquetFile(handle, page_checksum_verification=True) as file:
-            release_digest, scorers = _parse_metadata(file.schema_arrow)
-            chosen = _chosen(scorers, only, where)
-            return file.read([KEY_COLUMN, *(one.name for one in chosen)]), release_digest, chosen
+            yield file
     except FileNotFoundError as error:
         raise ConfigError(f"there are no scores at {where}; run `wsm score RELEASE` first") from error
     except (pa.ArrowException, OSError, ValueError, TypeError, KeyError) as error:
