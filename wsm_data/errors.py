@@ -86,6 +86,12 @@ class IntegrityError(WsmError):
     exit_code = 4
 
 
+class StoreError(WsmError):
+    """A remote store refuses, or does not give what it holds after all attempts."""
+
+    exit_code = 5
+
+
 class DataError(WsmError):
     """This unit is unusable: it is quarantined under `reason`, and the run goes on.
 

@@ -5,10 +5,12 @@ import re
 
 import pytest
 
-from wsm_data.errors import BudgetExceeded, ConfigError, DataError, IntegrityError, Reason, WsmError
+from wsm_data.errors import BudgetExceeded, ConfigError, DataError, IntegrityError, Reason, StoreError, WsmError
 
 
-@pytest.mark.parametrize(("kind", "code"), [(ConfigError, 2), (BudgetExceeded, 3), (IntegrityError, 4)])
+@pytest.mark.parametrize(
+    ("kind", "code"), [(ConfigError, 2), (BudgetExceeded, 3), (IntegrityError, 4), (StoreError, 5)]
+)
 def test_each_foreseen_failure_has_its_exit_code(kind, code):
     assert issubclass(kind, WsmError)
     assert kind("message").exit_code == code

@@ -42,13 +42,22 @@ class ShardReader(Protocol):
 
         Raises:
             IntegrityError: the shard is missing, or ends before the last buffer is full; names the shard.
-            OSError: the system or the store refuses to read, after all attempts.
+            OSError: the system refuses to read.
+            StoreError: the store refuses, or failed in all attempts; names the object.
         """
 
     def expect(self, spans: Sequence[Span]) -> None:
         """Say what will be read next, in this order, so that a slow store can be asked in advance.
 
         A hint: what was announced may never be read, and what is read may never have been announced.
+        """
+
+    def forget(self, shard: str) -> bool:
+        """Let go of what is kept of a shard, because bytes that were read from it are not what they should be.
+
+        Returns:
+            Whether reading the stretch again may bring other bytes: True where they come from a store, whose answer or
+            whose copy in a cache may have been damaged on the way; False where they lie on this machine's own disk.
         """
 
     def close(self) -> None:
