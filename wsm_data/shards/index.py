@@ -69,6 +69,17 @@ class IndexTable:
         """An integer column as an array [rows]."""
         return np.asarray(self.table[column].to_numpy())
 
+    def codes(self, column: str) -> tuple[np.ndarray, tuple[str, ...]]:
+        """A repeated text column as numbers into its distinct values: int32 [rows], and the values."""
+        column_of_one = self.table[column].combine_chunks()
+        values = column_of_one.dictionary if len(column_of_one) else pa.array([], pa.string())
+        codes = column_of_one.indices if len(column_of_one) else pa.array([], pa.int32())
+        return np.asarray(codes.to_numpy()), tuple(values.to_pylist())
+
+    def texts_at(self, column: str, rows: np.ndarray) -> list[str]:
+        """Values of a text column in some rows, in the order of `rows`."""
+        return list(self.table[column].take(pa.array(rows)).to_pylist())
+
     def counts(self, column: str) -> dict[str, int]:
         """How many clips have each value of a text column, sorted by value."""
         counted = pc.value_counts(self.table[column].combine_chunks().cast(pa.string()))

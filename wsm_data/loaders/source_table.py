@@ -1,0 +1,254 @@
+"""The clips that a loader draws from: releases opened, split and selection applied, and every clip with a number.
+
+The number of a clip over all sources, its *ref*, is the base of its source plus its number in the source's table, which
+has the clips in the order of the index.
+"""
+
+import logging
+from bisect import bisect_right
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from wsm_data.errors import ConfigError
+from wsm_data.files.digest import sha256_bytes
+from wsm_data.loaders.config import SourceConfig
+from wsm_data.loaders.order import SourceLayout
+from wsm_data.loaders.stable_hash import Int64Array
+from wsm_data.shards.index_row import IndexRow
+from wsm_data.shards.manifest import release_digest
+from wsm_data.shards.release import Release, open_release
+from wsm_data.shards.selection import read_selection
+
+_LOG = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SourceTable:
+    """The clips of one source, in the order of the index. Columns are read when they are first asked for.
+
+    Attributes:
+        config: what was asked for.
+        release: the release; its index is read column by column.
+        digest: digest of the release.
+        selection: name of the selection, empty for none.
+        rows: rows of the index that the source has, ascending; int64 [clips].
+        base: ref of its first clip.
+    """
+
+    config: SourceConfig
+    release: Release
+    digest: str
+    selection: str
+    rows: Int64Array
+    base: int
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    @cached_property
+    def shards(self) -> tuple[str, ...]:
+        """File names of the shards of the release."""
+        return self._shard_column[1]
+
+    @cached_property
+    def shard_codes(self) -> np.ndarray:
+        """Shard of each clip, as a number into `shards`; int32 [clips]."""
+        return self._of_source(self._shard_column[0])
+
+    @cached_property
+    def layout(self) -> SourceLayout:
+        """What the order of the source depends on."""
+        codes = self.shard_codes
+        starts = np.flatnonzero(np.concatenate([[True], codes[1:] != codes[:-1]])) if len(codes) else codes
+        shard_clips = np.diff(np.append(starts, len(codes))).astype(np.int64)
+        return SourceLayout(shard_clips=shard_clips, latents=self.column("latents"), weight=self.config.weight)
+
+    def column(self, name: str) -> np.ndarray:
+        """An integer column of the index for the clips of the source, such as `rgb_latent_offset`; [clips]. Kept."""
+        if name not in self._columns:
+            self._columns[name] = self._of_source(self.release.index.numbers(name))
+        return self._columns[name]
+
+    def keys(self, numbers: Sequence[int] | Int64Array) -> list[str]:
+        """Keys of some clips, by their numbers in the table."""
+        return self.release.index.texts_at("key", self.rows[np.asarray(numbers, np.int64)])
+
+    def index_row(self, number: int) -> IndexRow:
+        """Everything the index says of a clip, by its number in the table.
+
+        Raises:
+            IntegrityError: the row contradicts itself.
+        """
+        return self.release.index.row_at(int(self.rows[number]))
+
+    @cached_property
+    def _columns(self) -> dict[str, np.ndarray]:
+        return {}
+
+    @cached_property
+    def _shard_column(self) -> tuple[np.ndarray, tuple[str, ...]]:
+        return self.release.index.codes("shard")
+
+    def _of_source(self, column: np.ndarray) -> np.ndarray:
+        return column if len(self.rows) == len(column) else column[self.rows]
+
+
+@dataclass(frozen=True, eq=False)
+class Sources:
+    """All sources of a loader.
+
+    Attributes:
+        tables: the sources, in the order of the settings.
+        duplicates: clips that are reached through more than one source.
+    """
+
+    tables: tuple[SourceTable, ...]
+    duplicates: int
+
+    @property
+    def clips(self) -> int:
+        """Clips of all sources; a ref is a number below it."""
+        return self.tables[-1].base + len(self.tables[-1])
+
+    @cached_property
+    def layouts(self) -> tuple[SourceLayout, ...]:
+        """What the order depends on."""
+        return tuple(table.layout for table in self.tables)
+
+    def locate(self, ref: int) -> tuple[SourceTable, int]:
+        """The source of a clip, and the number of the clip in the source's table.
+
+        Raises:
+            ValueError: there is no such ref.
+        """
+        if not 0 <= ref < self.clips:
+            raise ValueError(f"a ref must be at least 0 and below {self.clips}, found {ref}")
+        table = self.tables[bisect_right(self._bases, ref) - 1]
+        return table, int(ref) - table.base
+
+    def key(self, ref: int) -> str:
+        """Key of a clip."""
+        return self.keys([ref])[0]
+
+    def keys(self, refs: Sequence[int] | Int64Array) -> list[str]:
+        """Keys of clips, in the order of the refs."""
+        wanted = np.asarray(refs, np.int64)
+        keys = np.empty(len(wanted), object)
+        owners = np.searchsorted(self._bases, wanted, side="right") - 1
+        for number in np.unique(owners):
+            table, own = self.tables[number], owners == number
+            keys[own] = table.keys(wanted[own] - table.base)
+        return list(keys)
+
+    def identity(self) -> list[dict[str, Any]]:
+        """What the order is drawn over, as JSON: for each source the release by name and digest, never by its place."""
+        return [_identity(table) for table in self.tables]
+
+    @cached_property
+    def _bases(self) -> list[int]:
+        return [table.base for table in self.tables]
+
+
+def open_sources(configs: Sequence[SourceConfig]) -> Sources:
+    """Open the releases of all sources; a release of several sources is opened once.
+
+    Raises:
+        ConfigError: there is no such release, split or selection, the selection is of another release, a source has
+            no clip, or the sources were made with different codecs or image sizes.
+        IntegrityError: a release is unfinished or damaged.
+    """
+    if not configs:
+        raise ConfigError("a loader must have at least one source, found none; name a release in sources")
+    releases: dict[str, Release] = {}
+    tables: list[SourceTable] = []
+    for config in configs:
+        if config.release not in releases:
+            releases[config.release] = open_release(config.release)
+        base = tables[-1].base + len(tables[-1]) if tables else 0
+        tables.append(_open_source(config, releases[config.release], base))
+        _require_alike(tables[0].release, tables[-1].release)
+    return Sources(tuple(tables), count_duplicates(tables))
+
+
+def _open_source(config: SourceConfig, release: Release, base: int) -> SourceTable:
+    digest = release_digest(release.manifest)
+    rows, selection = np.arange(len(release.index)), ""
+    if config.selection:
+        chosen = read_selection(release.store, config.selection, digest)
+        rows, selection = chosen.rows_of(release.index), chosen.name
+    if config.split:
+        rows = rows[_is_of_split(config, release)[rows]]
+    if not len(rows):
+        raise ConfigError(f"{release.store.root}: selection {config.selection} has no clip of split {config.split}")
+    return SourceTable(config=config, release=release, digest=digest, selection=selection, rows=rows, base=base)
+
+
+def _is_of_split(config: SourceConfig, release: Release) -> np.ndarray:
+    """For each row of the index, whether it is of the split of the source; bool [rows]."""
+    codes, splits = release.index.codes("split")
+    if config.split not in splits:
+        raise ConfigError(
+            f"{release.store.root} must have clips of split {config.split!r}, found {', '.join(splits) or 'none'}; "
+            "set split to one of them, or to '' for all"
+        )
+    return codes == splits.index(config.split)
+
+
+def _require_alike(first: Release, other: Release) -> None:
+    """Latents of one batch must mean the same and have the same shape."""
+    first.require_codec(other.manifest.codec)
+    sizes = [(release.manifest.encoded_width_px, release.manifest.encoded_height_px) for release in (first, other)]
+    if sizes[0] != sizes[1]:
+        raise ConfigError(
+            f"the sources of a loader must have images of one size: {first.store.root} has {sizes[0]}, "
+            f"{other.store.root} has {sizes[1]} (width and height, px); load them apart, or encode one again"
+        )
+
+
+def count_duplicates(tables: Sequence[SourceTable]) -> int:
+    """Count the clips that an earlier source has too, by key and digest of their content, and log what was found."""
+    total = 0
+    for number, table in enumerate(tables):
+        for earlier in tables[:number]:
+            keys = _shared_keys(earlier, table)
+            total += len(keys)
+            if keys:
+                _LOG.warning(
+                    "%d clips, such as %s, come from source %s and from source %s; an epoch brings them once for each",
+                    len(keys), keys[0], _words(earlier), _words(table),
+                )  # fmt: skip
+    return total
+
+
+def _shared_keys(one: SourceTable, other: SourceTable) -> list[str]:
+    if one.digest == other.digest:
+        rows = np.intersect1d(one.rows, other.rows, assume_unique=True)
+        return one.release.index.texts_at("key", rows)
+    own, others = _content(one), _content(other)
+    return [key for key, digest in own.items() if others.get(key) == digest]
+
+
+def _content(table: SourceTable) -> dict[str, str]:
+    index = table.release.index
+    return dict(zip(index.texts_at("key", table.rows), index.texts_at("source_digest", table.rows), strict=True))
+
+
+def _words(table: SourceTable) -> str:
+    parts = (table.config.release, table.config.split, table.selection)
+    return " / ".join(part for part in parts if part)
+
+
+def _identity(table: SourceTable) -> dict[str, Any]:
+    return {
+        "release": table.release.manifest.name,
+        "release_digest": table.digest,
+        "split": table.config.split,
+        "selection": table.selection,
+        "clips": len(table),
+        "selection_sha256": sha256_bytes(table.rows.astype("<i8").tobytes()) if table.selection else "",
+        "weight": table.config.weight,
+    }
