@@ -148,8 +148,8 @@ def _add_step(
     (begun, start, steps), refs = segments[-1] if segments else ((-1, 0, 0), [])
     if (epoch, step) != (begun, start + len(refs)) or step >= steps:
         raise IntegrityError(
-            f"{path}: at byte {place} step {start + len(refs)} of epoch {begun} must follow, found step {step} of epoch "
-            f"{epoch}; restore the file"
+            f"{path}: at byte {place} step {start + len(refs)} of epoch {begun} must follow, found step {step} of "
+            f"epoch {epoch}; restore the file"
         )
     refs.append(np.frombuffer(payload[STEP_FIELDS.size :], "<i8"))
 
