@@ -43,13 +43,18 @@ def source_stretch(layout: SourceLayout, order: OrderConfig, *, source: int, epo
     clips = len(layout)
     if not clips:
         return np.empty(0, np.int64)
-    each = Fraction(repr(layout.weight)) * clips  # the decimal that was written: ten tenths of it are one pass
-    first, last = round(epoch * each), round((epoch + 1) * each)
+    first, last = stretch_of_epoch(clips, layout.weight, epoch)
     parts = [np.empty(0, np.int64)]
     for number in range(first // clips, -(-last // clips)):
         whole = pass_order(layout.shard_clips, order, source=source, number=number)
         parts.append(whole[max(first - number * clips, 0) : last - number * clips])
     return parts[1] if len(parts) == 2 else np.concatenate(parts)
+
+
+def stretch_of_epoch(clips: int, weight: float, epoch: int) -> tuple[int, int]:
+    """Where the stretch of an epoch begins and ends in the endless sequence of the passes over `clips` clips."""
+    each = Fraction(repr(weight)) * clips  # the decimal that was written: ten tenths of it are one pass
+    return round(epoch * each), round((epoch + 1) * each)
 
 
 def _merge(parts: Sequence[Int64Array]) -> Int64Array:
