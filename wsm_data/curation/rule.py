@@ -1,0 +1,172 @@
+"""How hard a clip is: scores put into one number by weighted ranks, or one after the other.
+
+Scores have different units and tails, so they are compared by rank: the percentile of a clip is the share of clips that
+are easier, clips of equal value counted half (mid-ranks). Any monotone change of a score's unit leaves it as it is.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wsm_data.curation.scores_table import Direction, ScorerInfo, ScoreTable
+from wsm_data.errors import ConfigError
+from wsm_data.files.typed_toml import did_you_mean
+from wsm_data.schema.arrays import Float32Array, Float64Array
+
+GEOMETRY_WEIGHTS: Mapping[str, float] = MappingProxyType({"detour": 1.0})
+"""The default rule, which needs no model."""
+
+MODEL_ORDER = ("rollout_unsafe_share", "rollout_mean_cost")
+"""Recommended for `lexicographic` once a policy was rolled out: how often it is unsafe, and then what it costs."""
+
+
+class RuleKind(StrEnum):
+    """How scores become one number."""
+
+    WEIGHTED = "weighted"
+    LEXICOGRAPHIC = "lexicographic"
+
+
+@dataclass(frozen=True, kw_only=True)
+class RuleConfig:
+    """What hard means.
+
+    Attributes:
+        kind: `weighted`: the weighted mean of the percentiles of `weights`. `lexicographic`: by the first score of
+            `order`, clips that are equal in it by the second one, and so on.
+        weights: weight of each score, above 0; only for `weighted`. Given weights replace the default ones.
+        order: scores by importance; only for `lexicographic`.
+    """
+
+    kind: RuleKind = RuleKind.WEIGHTED
+    weights: Mapping[str, float] = field(default_factory=lambda: GEOMETRY_WEIGHTS)
+    order: tuple[str, ...] = MODEL_ORDER
+
+    def __post_init__(self) -> None:
+        for name, weight in self.weights.items():
+            if not (0 < weight < np.inf):
+                raise ValueError(
+                    f"weights.{name} must be a number above 0, found {weight}; leave the score out instead"
+                )
+        if not self.scores:
+            raise ValueError("a rule needs at least one score")
+        if len(set(self.scores)) != len(self.scores):
+            raise ValueError(f"order must name a score once, found {list(self.order)}")
+
+    @property
+    def scores(self) -> tuple[str, ...]:
+        """Names of the scores that the rule reads."""
+        return tuple(self.weights) if self.kind is RuleKind.WEIGHTED else self.order
+
+    @property
+    def score_weights(self) -> Mapping[str, float]:
+        """Weight of each score that the rule reads; equal ones where it goes by their order."""
+        return self.weights if self.kind is RuleKind.WEIGHTED else dict.fromkeys(self.order, 1.0)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Rating:
+    """How hard clips are under a rule.
+
+    Attributes:
+        difficulty: larger is harder, in [0, 1]; float64 [M].
+        percentiles: share of clips that are easier, by the name of the score; float32 [M]; NaN where a clip has none.
+    """
+
+    difficulty: Float64Array
+    percentiles: Mapping[str, Float32Array]
+
+
+def rate_clips(scores: ScoreTable, config: RuleConfig, rows: NDArray[np.int64] | None = None) -> Rating:
+    """Rate clips against one another.
+
+    A clip without a value of a score is rated by its others under `weighted`, and as the easiest one by that score
+    under `lexicographic`: it was not shown to be hard.
+
+    Args:
+        scores: the scores of a release.
+        config: the rule.
+        rows: which clips, int64 [M]; None for all.
+
+    Raises:
+        ConfigError: the rule names a score that is not there or has no hard end, or a clip has none of its scores.
+    """
+    infos = [_require_score(scores, name) for name in config.scores]
+    percentiles = {one.name: hardness_percentiles(_column(scores, one.name, rows), one.direction) for one in infos}
+    ranked = list(percentiles.values())
+    if config.kind is RuleKind.WEIGHTED:
+        difficulty = _weighted_mean(ranked, list(config.weights.values()))
+    else:
+        difficulty = _lexicographic(ranked)
+    unrated = np.isnan(difficulty)
+    if unrated.any():
+        place = int(unrated.argmax())
+        key = scores.keys[place if rows is None else int(rows[place])].as_py()
+        raise ConfigError(
+            f"{int(unrated.sum())} clips have none of the scores of the rule ({', '.join(config.scores)}), such as "
+            f"{key}; score them, or select by other scores"
+        )
+    return Rating(
+        difficulty=difficulty, percentiles={name: one.astype(np.float32) for name, one in percentiles.items()}
+    )
+
+
+def hardness_percentiles(values: Float64Array, direction: Direction) -> Float64Array:
+    """Share of values that are easier than each, equal ones counted half; NaN, where there is no value, stays NaN.
+
+    Returns:
+        float64 [M], strictly between 0 and 1.
+    """
+    order = np.argsort(values)
+    known = len(values) - int(np.isnan(values).sum())  # numpy sorts NaN to the end
+    ordered = values[order[:known]]
+    starts = np.flatnonzero(np.concatenate([[True], ordered[1:] != ordered[:-1]])) if known else np.zeros(0, np.int64)
+    counts = np.diff(np.append(starts, known))
+    shares = (starts + counts / 2) / max(known, 1)
+    result = np.full(len(values), np.nan)
+    result[order[:known]] = np.repeat(1 - shares if direction is Direction.LOWER else shares, counts)
+    return result
+
+
+def _column(scores: ScoreTable, name: str, rows: NDArray[np.int64] | None) -> Float64Array:
+    values = scores.columns[name]
+    return values if rows is None else values[rows]
+
+
+def _require_score(scores: ScoreTable, name: str) -> ScorerInfo:
+    infos = {one.name: one for one in scores.scorers}
+    if name not in infos:
+        hint = " (from rollouts: evaluate a policy first)" if name.startswith("rollout_") else ""
+        raise ConfigError(f"the rule needs the score {name!r}{hint}, which is not there; {did_you_mean(name, infos)}")
+    if infos[name].direction is Direction.NEUTRAL:
+        raise ConfigError(f"the score {name!r} has no hard end, so a rule cannot go by it; take another")
+    return infos[name]
+
+
+def _weighted_mean(percentiles: Sequence[Float64Array], weights: Sequence[float]) -> Float64Array:
+    """Mean over the scores a clip has; NaN where it has none."""
+    total = np.zeros(len(percentiles[0]))
+    weight_of_all = np.zeros(len(percentiles[0]))
+    for values, weight in zip(percentiles, weights, strict=True):
+        known = ~np.isnan(values)
+        total += np.where(known, values, 0.0) * weight
+        weight_of_all += known * weight
+    return np.divide(total, weight_of_all, out=np.full(len(total), np.nan), where=weight_of_all > 0)
+
+
+def _lexicographic(percentiles: Sequence[Float64Array]) -> Float64Array:
+    """Mid-rank in the order by the first score, then the second, ...; NaN where a clip has none of them."""
+    codes = [np.nan_to_num(values, nan=-1.0) for values in percentiles]
+    order = np.lexsort(codes[::-1])
+    changes = np.zeros(len(order), bool)
+    for one in codes:
+        changes[1:] |= one[order][1:] != one[order][:-1]
+    group = np.empty(len(order))
+    group[order] = np.cumsum(changes)
+    difficulty = hardness_percentiles(group, Direction.HIGHER)
+    difficulty[np.all([np.isnan(values) for values in percentiles], axis=0)] = np.nan
+    return difficulty
