@@ -26,7 +26,7 @@ def atomic_file(path: Path) -> Iterator[BinaryIO]:
             file.flush()
             os.fsync(file.fileno())
         temporary.replace(path)
-        _flush_folder(path.parent)
+        flush_folder(path.parent)
     finally:
         temporary.unlink(missing_ok=True)  # there is none once it has been renamed
 
@@ -53,7 +53,7 @@ def remove_temporaries(folder: Path) -> int:
     return len(leftovers)
 
 
-def _flush_folder(folder: Path) -> None:
+def flush_folder(folder: Path) -> None:
     """Bring the folder's list of names to disk: without it a power cut may undo a rename that was reported done."""
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:

@@ -44,8 +44,8 @@ _PASSING_FAILURES_OF_LIBRARIES = {
     "botocore.exceptions": ("HTTPClientError", "ConnectionError", "IncompleteReadError"),
     "botocore.parsers": ("ResponseParserError",),
 }
-"""What s3fs and fsspec's HTTP file system let through beside OSError. s3fs translates the answers of a store to OSError,
-but not the failures of a connection."""
+"""What s3fs and fsspec's HTTP file system let through beside OSError: s3fs translates the answers of a store to it, but
+not the failures of a connection."""
 
 
 @dataclass(frozen=True, kw_only=True)

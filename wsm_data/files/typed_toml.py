@@ -102,6 +102,7 @@ def convert(hint: Any, value: Any, name: str) -> Any:
     if is_dataclass(hint):
         return build_config(typing.cast(type, hint), _section(value, name), name)
     if origin is Mapping:
+        value = _toml_value(value) if isinstance(value, Word) else value
         of_items = typing.get_args(hint)[1]
         return {key: convert(of_items, item, dotted(name, key)) for key, item in _section(value, name).items()}
     if origin is tuple:

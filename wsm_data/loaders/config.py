@@ -7,6 +7,8 @@ are read (threads, workers, caches) never changes what is delivered.
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+from wsm_data.files.retries import RequestConfig
+
 MAX_CHUNK_LATENTS = 4
 """Largest chunk size K (paper, implementation details: K is drawn from 1 to 4)."""
 
@@ -127,6 +129,7 @@ class ReadConfig:
         fetch_threads: requests to a store at the same time.
         attempts: how often a request is tried before the run stops.
         first_backoff_s: pause after the first failed attempt, s; it doubles with each further one.
+        request_timeout_s: longest time of one attempt for every 8 MiB asked for, or part of them, s.
     """
 
     verify: Verify = Verify.FIRST
@@ -141,8 +144,9 @@ class ReadConfig:
     cache_dir: str = ""
     cache_gib: float = 50.0
     fetch_threads: int = 8
-    attempts: int = 6
-    first_backoff_s: float = 0.25
+    attempts: int = RequestConfig.attempts
+    first_backoff_s: float = RequestConfig.first_backoff_s
+    request_timeout_s: float = RequestConfig.timeout_s
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wsm_data.files.stores import FsspecStore, LocalStore, open_store
+from wsm_data.files.fsspec_store import FsspecStore
+from wsm_data.files.stores import LocalStore, open_store
 
 FILES = {"b.tar": bytes(range(256)) * 5, "a.json": b"{}", "empty": b""}
 
