@@ -158,6 +158,17 @@ def read_scores(
     return table
 
 
+def read_scorers(location: str | Path) -> tuple[ScorerInfo, ...]:
+    """What the scores of a file say of themselves, in the order of their columns; no column is read.
+
+    Raises:
+        ConfigError: there is no such file.
+        IntegrityError: it is damaged, or no table of scores of this version.
+    """
+    with _open(str(location)) as file:
+        return _parse_metadata(file.schema_arrow)[1]
+
+
 def read_paths(location: str | Path, rows: NDArray[np.int64]) -> Float32Array:
     """Read the outlines of some clips' paths, in constant memory beside what is returned.
 

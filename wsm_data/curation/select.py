@@ -161,6 +161,6 @@ def _require_enough(candidates: int, count: int, excluded: Excluded, config: Sel
     if candidates < count:
         reasons = ", ".join(f"{number} by {reason}" for reason, number in excluded.counts.items())
         raise ConfigError(
-            f"fraction = {config.fraction:g} asks for {count} clips, and {candidates} are left; excluded were {reasons}; "
+            f"fraction {config.fraction:g} asks for {count} clips, and {candidates} are left; excluded are {reasons}; "
             "choose a smaller fraction, or exclude fewer"
         )

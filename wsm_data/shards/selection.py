@@ -21,8 +21,8 @@ from wsm_data.files.jsonlines import canonical_json
 from wsm_data.files.stores import Store, open_store
 from wsm_data.schema.arrays import Float64Array
 from wsm_data.shards.index import IndexTable
+from wsm_data.shards.names import SELECTIONS_FOLDER
 
-SELECTION_FOLDER = "selections"
 SELECTION_SUFFIX = ".parquet"
 SELECTION_VERSION = 1
 _METADATA = b"wsm.selection"
@@ -77,14 +77,14 @@ class Selection:
         Raises:
             IntegrityError: a clip is not in the index.
         """
-        rows = pc.index_in(self.keys, value_set=index.table["key"].combine_chunks())
-        if rows.null_count:
-            missing = self.keys.filter(pc.is_null(rows))
+        rows = index.rows_of(self.keys)
+        missing = np.flatnonzero(rows < 0)
+        if len(missing):
             raise IntegrityError(
                 f"selection {self.name} lists {len(missing)} clips that its release does not have, such as "
-                f"{missing[0].as_py()}; select again"
+                f"{self.keys[int(missing[0])].as_py()}; select again"
             )
-        return np.sort(rows.to_numpy()).astype(np.int64)
+        return np.sort(rows)
 
 
 def require_selection_name(name: str) -> str:
@@ -102,13 +102,13 @@ def require_selection_name(name: str) -> str:
 
 def selection_path(name: str) -> str:
     """Where a selection stands in its release, relative to the release's folder."""
-    return f"{SELECTION_FOLDER}/{name}{SELECTION_SUFFIX}"
+    return f"{SELECTIONS_FOLDER}/{name}{SELECTION_SUFFIX}"
 
 
 def selection_names(release: Store) -> list[str]:
     """Names of the selections that stand in a release, sorted."""
     try:
-        files = open_store(f"{release.root}/{SELECTION_FOLDER}").names()
+        files = open_store(f"{release.root}/{SELECTIONS_FOLDER}").names()
     except FileNotFoundError:
         return []
     return [file.removesuffix(SELECTION_SUFFIX) for file in files if is_selection_file(file)]

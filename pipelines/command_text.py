@@ -1,0 +1,49 @@
+"""A command as it would be typed: every setting that is not the default, in one spelling."""
+
+import json
+import shlex
+from collections.abc import Iterator, Mapping
+from dataclasses import fields, is_dataclass
+from enum import Enum
+from typing import Any
+
+from wsm_data.files.typed_toml import dotted
+
+
+def command_text(words: str, config: Any, default: Any) -> str:
+    """The command that has the settings of `config`; inputs and speed are left out.
+
+    Two ways to say the same, on the command line or in a file and in any order, have one text.
+
+    Args:
+        words: the command and its arguments, such as `wsm select RELEASE`.
+        config: what was set.
+        default: a config of the same type with default settings.
+    """
+    return " ".join([words, *(f"--set {shlex.quote(word)}" for word in _assignments(config, default))])
+
+
+def _assignments(config: Any, default: Any, where: str = "") -> Iterator[str]:
+    for field in fields(config):
+        value, old = getattr(config, field.name), getattr(default, field.name)
+        name = dotted(where, field.name)
+        if field.metadata.get("role") or value == old:
+            continue
+        if is_dataclass(value):
+            yield from _assignments(value, old, name)
+        else:
+            yield f"{name}={_toml(value)}"
+
+
+def _toml(value: Any) -> str:
+    """A value in TOML; what is None is left out of a table, where it stands for the default."""
+    if is_dataclass(value):
+        value = {field.name: getattr(value, field.name) for field in fields(value)}
+    if isinstance(value, Mapping):
+        items = [f"{json.dumps(key)} = {_toml(item)}" for key, item in sorted(value.items()) if item is not None]
+        return "{" + ", ".join(items) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(_toml(item) for item in value) + "]"
+    if isinstance(value, Enum):
+        return json.dumps(value.value)
+    return "none" if value is None else json.dumps(value)

@@ -1,0 +1,162 @@
+"""`wsm select`: the hard share of a release as a list of clips, with the reasons."""
+
+import hashlib
+import logging
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import fsspec
+import pyarrow as pa
+
+from pipelines.command_text import command_text
+from pipelines.config import settings_of
+from pipelines.stage import Outcome, Stage, StageContext, Unit
+from wsm_data.curation.scores_table import ScoreTable, read_paths, read_scorers, read_scores
+from wsm_data.curation.select import INDEX_COLUMNS, ChosenClips, SelectionConfig, select_clips
+from wsm_data.errors import ConfigError
+from wsm_data.files.atomic import write_bytes
+from wsm_data.files.digest import sha256_file
+from wsm_data.files.stores import open_store
+from wsm_data.files.typed_toml import INPUT
+from wsm_data.shards.manifest import release_digest
+from wsm_data.shards.names import SCORES_NAME
+from wsm_data.shards.release import Release, open_release, read_manifest
+from wsm_data.shards.selection import (
+    SELECTION_SUFFIX,
+    Selection,
+    require_selection_name,
+    selection_path,
+    write_selection,
+)
+
+_LOG = logging.getLogger(__name__)
+_UNIT = "selection"
+
+
+@dataclass(frozen=True, kw_only=True)
+class SelectConfig(SelectionConfig):
+    """Settings of `wsm select`: those of `SelectionConfig`, and these.
+
+    Attributes:
+        release: folder or URL of the release.
+        scores: path or URL of its scores; where it is not given, scores.parquet in the release.
+        name: name of the selection.
+    """
+
+    release: str = field(metadata=INPUT)
+    scores: str = field(default="", metadata=INPUT)
+    name: str = "hard"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require_selection_name(self.name)
+
+    @property
+    def scores_location(self) -> str:
+        """Where the scores are."""
+        return self.scores or f"{self.release.rstrip('/')}/{SCORES_NAME}"
+
+    @property
+    def file_name(self) -> str:
+        """File of the selection in the folder of the stage."""
+        return f"{self.name}{SELECTION_SUFFIX}"
+
+
+def _list_units(config: SelectConfig) -> Sequence[Unit]:
+    digest = release_digest(read_manifest(open_store(config.release)))
+    return [Unit(id=_UNIT, inputs={"manifest": digest, "scores": _scores_sha256(config.scores_location)})]
+
+
+def _process(batch: Sequence[Unit], config: SelectConfig, context: StageContext) -> Iterator[Outcome]:
+    for unit in batch:
+        release = open_release(config.release)
+        scores = read_needed_scores(release, config)
+        index = release.index.columns(INDEX_COLUMNS)
+        chosen = select_clips(index, scores, partial(read_paths, config.scores_location), config)
+        path = context.out / config.file_name
+        write_selection(path, _selection(config, scores, index, chosen, unit.inputs["scores"]))
+        install_selection(path, config)
+        facts = {
+            "clips chosen": len(chosen.rows),
+            "of trajectories": chosen.trajectories,
+            "near-duplicates left out": chosen.near_duplicates,
+            "over quota": chosen.over_quota,
+        }
+        yield Outcome(unit=unit.id, digest=sha256_file(path), outputs=(config.file_name,), facts=facts)
+
+
+def read_needed_scores(release: Release, config: SelectConfig) -> ScoreTable:
+    """The scores that the settings name.
+
+    Raises:
+        ConfigError: there are none, they are of another release, one is not there, or a value is NaN.
+    """
+    return read_scores(
+        config.scores_location,
+        release_digest=release_digest(release.manifest),
+        release_keys=release.index.columns(["key"])["key"],
+        only=config.score_names(read_scorers(config.scores_location)),
+    )
+
+
+def install_selection(path: Path, config: SelectConfig) -> None:
+    """Put the selection into its release, where loaders find it by its name; nothing is done behind a URL."""
+    if "://" in config.release:
+        _LOG.warning("%s is not copied to %s: put it at %s there", path, config.release, selection_path(config.name))
+        return
+    data, installed = path.read_bytes(), Path(config.release) / selection_path(config.name)
+    if installed.is_file() and installed.read_bytes() == data:
+        return
+    try:
+        write_bytes(installed, data)
+    except PermissionError as error:
+        _LOG.warning("%s cannot be copied into its release (%s); name it by its path", path, error)
+
+
+def _selection(
+    config: SelectConfig, scores: ScoreTable, index: pa.Table, chosen: ChosenClips, scores_sha256: str
+) -> Selection:
+    keys = index["key"].take(pa.array(chosen.rows))
+    return Selection(
+        name=config.name,
+        release_digest=scores.release_digest,
+        rule=_rule(config, scores, chosen, scores_sha256),
+        command=command_text("wsm select RELEASE", config, SelectConfig(release=config.release)),
+        keys=pa.concat_arrays(keys.chunks),
+        scores=chosen.difficulty,
+        why=chosen.why,
+    )
+
+
+def _rule(config: SelectConfig, scores: ScoreTable, chosen: ChosenClips, scores_sha256: str) -> dict[str, Any]:
+    """Everything the choice depended on, defaults written out, and what became of the clips."""
+    return {
+        "settings": settings_of(config),
+        "scores_sha256": scores_sha256,
+        "scores": {
+            one.name: {"unit": one.unit, "direction": one.direction.value, "version": one.version}
+            for one in scores.scorers
+        },
+        "stage_version": STAGE.version,
+        "clips": {
+            "of the split": chosen.trajectories,
+            "excluded": dict(chosen.excluded),
+            "near-duplicates left out": chosen.near_duplicates,
+            "over quota": chosen.over_quota,
+            "chosen": len(chosen.rows),
+        },
+    }
+
+
+def _scores_sha256(location: str) -> str:
+    try:
+        with fsspec.open(location, "rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except FileNotFoundError as error:
+        raise ConfigError(f"there are no scores at {location}; run `wsm score RELEASE` first") from error
+
+
+STAGE = Stage(name="select", version=1, config_type=SelectConfig, list_units=_list_units, process=_process)
