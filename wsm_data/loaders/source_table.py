@@ -12,6 +12,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
 
 from wsm_data.errors import ConfigError
 from wsm_data.files.digest import sha256_bytes
@@ -75,7 +77,7 @@ class SourceTable:
 
     def keys(self, numbers: Sequence[int] | Int64Array) -> list[str]:
         """Keys of some clips, by their numbers in the table."""
-        return self.release.index.texts_at("key", self.rows[np.asarray(numbers, np.int64)])
+        return self.release.index.keys_at(self.rows[np.asarray(numbers, np.int64)])
 
     def index_row(self, number: int) -> IndexRow:
         """Everything the index says of a clip, by its number in the table.
@@ -227,14 +229,15 @@ def count_duplicates(tables: Sequence[SourceTable]) -> int:
 def _shared_keys(one: SourceTable, other: SourceTable) -> list[str]:
     if one.digest == other.digest:
         rows = np.intersect1d(one.rows, other.rows, assume_unique=True)
-        return one.release.index.texts_at("key", rows)
-    own, others = _content(one), _content(other)
-    return [key for key, digest in own.items() if others.get(key) == digest]
+        return one.release.index.keys_at(rows)
+    own, others = (_content(table) for table in (one, other))
+    return [text.partition(" ")[0] for text in own.filter(pc.is_in(own, value_set=others)).to_pylist()]
 
 
-def _content(table: SourceTable) -> dict[str, str]:
-    index = table.release.index
-    return dict(zip(index.texts_at("key", table.rows), index.texts_at("source_digest", table.rows), strict=True))
+def _content(table: SourceTable) -> pa.StringArray:
+    """Key, which has no space, and digest of the content of each clip, as one text."""
+    columns = table.release.index.columns(["key", "source_digest"]).take(pa.array(table.rows)).combine_chunks()
+    return pc.binary_join_element_wise(*(column.combine_chunks() for column in columns.columns), " ")
 
 
 def _words(table: SourceTable) -> str:

@@ -5,13 +5,16 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+import pyarrow as pa
+
 from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.files.digest import sha256_bytes
-from wsm_data.files.stores import Store, open_store
+from wsm_data.files.stores import LocalStore, Store, open_store
 from wsm_data.schema.clip import Clip
 from wsm_data.schema.codec import CodecInfo
 from wsm_data.shards.clip_bytes import check_members, decode_clip
-from wsm_data.shards.index import IndexTable, parse_index
+from wsm_data.shards.index import IndexTable
+from wsm_data.shards.index_file import IndexFile, open_local_index
 from wsm_data.shards.index_row import IndexRow
 from wsm_data.shards.inventory import InventoryRow, parse_inventory, parse_quarantine
 from wsm_data.shards.manifest import ReleaseManifest, parse_manifest
@@ -113,13 +116,19 @@ def open_release(location: str | Path) -> Release:
     """
     store = open_store(location)
     manifest = read_manifest(store)
-    data = checked_file(store, INDEX_NAME, manifest.index_sha256)
-    index = parse_index(data, f"{store.root}/{INDEX_NAME}")
+    index = IndexTable(_open_index(store, manifest.index_sha256))
     if len(index) != manifest.clips:
         raise IntegrityError(
             f"{store.root}: the manifest counts {manifest.clips} clips, the index has {len(index)} rows"
         )
     return Release(store, manifest, index)
+
+
+def _open_index(store: Store, sha256: str) -> IndexFile:
+    """A local index stays on its disk; one behind a URL is fetched once."""
+    if isinstance(store, LocalStore):
+        return open_local_index(Path(store.root) / INDEX_NAME, sha256)
+    return IndexFile(pa.BufferReader(checked_file(store, INDEX_NAME, sha256)), f"{store.root}/{INDEX_NAME}")
 
 
 def read_manifest(store: Store) -> ReleaseManifest:

@@ -110,7 +110,8 @@ def count_release(release: Release) -> ReleaseCounts:
 
 
 def _text_columns(index: IndexTable) -> pa.Table:
-    return pa.table({name: index.table[name].cast(pa.string()) for name in _TEXT_COLUMNS})
+    columns = index.columns(_TEXT_COLUMNS)
+    return pa.table({name: columns[name].cast(pa.string()) for name in _TEXT_COLUMNS})
 
 
 def _groups(table: pa.Table) -> tuple[GroupCount, ...]:

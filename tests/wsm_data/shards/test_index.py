@@ -3,6 +3,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
@@ -36,6 +37,21 @@ def test_every_clip_is_found_by_its_key(index: IndexTable, tiny: SimpleNamespace
         assert (row.key, row.frames, row.source_digest) == (clip.meta.key, clip.frame_count, clip.meta.source_digest)
 
 
+def test_rows_are_found_by_many_keys_at_once(index: IndexTable) -> None:
+    keys = index.texts("key")
+    wanted = [keys[5], "no/such/clip", keys[0], keys[3]]
+    np.testing.assert_array_equal(index.rows_of(wanted), [5, -1, 0, 3])
+    np.testing.assert_array_equal(index.rows_of(pa.array(wanted)), [5, -1, 0, 3])
+    assert index.rows_of([]).tolist() == []
+    assert index.keys_at(np.array([4, 1, 4])) == [keys[4], keys[1], keys[4]]
+
+
+def test_a_row_that_is_not_there_is_no_row(index: IndexTable) -> None:
+    for number in (-1, len(index)):
+        with pytest.raises(IndexError, match=f"row {number} of an index of 7 rows"):
+            index.row_at(number)
+
+
 @pytest.mark.parametrize("key", ["", "a", "synth_d435i/home_0001/00000", "zzz"])
 def test_a_key_that_is_not_there_is_a_wrong_request(index: IndexTable, key: str) -> None:
     with pytest.raises(ConfigError, match="the release has no clip"):
@@ -54,8 +70,8 @@ def test_the_rows_of_a_shard_are_its_clips_by_offset(index: IndexTable, tiny: Si
 
 def test_flat_columns_are_enough_to_read_an_array(index: IndexTable, tiny: SimpleNamespace) -> None:
     clip = tiny.clips[0]
-    [row] = [row for row in index.table.to_pylist() if row["key"] == clip.meta.key]
-    layout = json.loads(index.table.schema.metadata[b"wsm.members"])
+    [row] = [row for row in index.columns(SCHEMA.names).to_pylist() if row["key"] == clip.meta.key]
+    layout = json.loads(index.columns(SCHEMA.names).schema.metadata[b"wsm.members"])
     data = (tiny.folder / row["shard"]).read_bytes()
     for name in MEMBERS:
         start, size = row[f"{name}_offset"], row[f"{name}_size"]

@@ -9,6 +9,7 @@ from wsm_data.errors import ConfigError
 from wsm_data.files.digest import sha256_file
 from wsm_data.schema.clip import Clip
 from wsm_data.shards.index import index_table, write_index
+from wsm_data.shards.index_row import SCHEMA
 from wsm_data.shards.manifest import manifest_bytes
 from wsm_data.shards.release import open_release
 from wsm_data.shards.verify import verify_release
@@ -120,8 +121,9 @@ def test_a_clip_that_is_invalid_is_found_even_where_all_digests_fit(
 
 def test_an_index_row_that_contradicts_itself_is_found_and_the_digest_still_checked(tiny: SimpleNamespace) -> None:
     index = open_release(tiny.folder).index
-    place = index.table.schema.get_field_index("poses_offset")
-    moved = index.table.set_column(place, index.table.schema.field(place), [[64] * len(index)])
+    table = index.columns(SCHEMA.names)
+    place = table.schema.get_field_index("poses_offset")
+    moved = table.set_column(place, table.schema.field(place), [[64] * len(index)])
     write_index(tiny.folder / "index.parquet", moved)
     kinds = _kinds(tiny.folder)
     assert kinds[0] == ("file.changed", None, None)

@@ -1,0 +1,96 @@
+import hashlib
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from wsm_data.errors import IntegrityError
+from wsm_data.shards.index import IndexTable, write_index
+from wsm_data.shards.index_file import IndexFile, open_local_index
+from wsm_data.shards.index_row import SCHEMA
+from wsm_data.shards.names import INDEX_NAME
+
+
+@pytest.fixture
+def path(tiny: SimpleNamespace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The index of the seven clips in groups of two rows."""
+    monkeypatch.setattr("wsm_data.shards.index._ROW_GROUP_ROWS", 2)
+    path = tmp_path / "small_groups.parquet"
+    write_index(path, pq.read_table(tiny.folder / INDEX_NAME, schema=SCHEMA))
+    return path
+
+
+def open_it(path: Path) -> IndexFile:
+    return open_local_index(path, hashlib.sha256(path.read_bytes()).hexdigest())
+
+
+def damage(path: Path, column: str, group: int) -> None:
+    chunk = pq.read_metadata(path).row_group(group).column(SCHEMA.get_field_index(column))
+    data = bytearray(path.read_bytes())
+    data[chunk.data_page_offset + chunk.total_compressed_size - 3] ^= 1
+    path.write_bytes(data)
+
+
+def test_groups_of_rows_give_what_the_whole_table_gives(path: Path) -> None:
+    assert pq.read_metadata(path).num_row_groups == 4
+    lazy, whole = IndexTable(open_it(path)), IndexTable(pq.read_table(path, schema=SCHEMA))
+    assert len(lazy) == len(whole) == 7
+    for row in [*range(7), 0, 6, 3]:
+        assert lazy.row_at(row) == whole.row_at(row)
+    for column in ("split", "shard", "scene"):
+        assert lazy.counts(column) == whole.counts(column)
+        codes, values = lazy.codes(column)
+        assert [values[code] for code in codes] == lazy.texts(column) == whole.texts(column)
+    for column in ("latents", "clip_offset", "poses_checksum"):
+        np.testing.assert_array_equal(lazy.numbers(column), whole.numbers(column))
+        assert lazy.numbers(column).dtype == SCHEMA.field(column).type.to_pandas_dtype()
+    for shard in whole.counts("shard"):
+        assert list(lazy.rows_of_shard(shard)) == list(whole.rows_of_shard(shard))
+
+
+def test_columns_and_groups_are_read_alone(path: Path) -> None:
+    damage(path, "poses_checksum", group=1)  # rows 2 and 3
+    index = IndexTable(open_it(path))
+    assert index.row_at(0).key == index.texts("key")[0]
+    assert index.row(index.texts("key")[6]).key == index.texts("key")[6]
+    with pytest.raises(IntegrityError, match=r"small_groups\.parquet must be the index of a release.*restore the file"):
+        index.numbers("poses_checksum")
+    with pytest.raises(IntegrityError, match=r"small_groups\.parquet must be the index of a release"):
+        index.row_at(2)
+
+
+def test_a_file_replaced_later_is_not_believed(path: Path, tmp_path: Path) -> None:
+    index = IndexTable(open_it(path))
+    keys = index.texts("key")
+    other = tmp_path / "other"
+    write_index(other, SCHEMA.empty_table())
+    other.replace(path)
+    assert index.texts("key") == keys
+
+
+def test_a_file_with_another_digest_is_refused_before_it_is_parsed(path: Path) -> None:
+    with pytest.raises(IntegrityError, match=r"small_groups\.parquet must have sha256 abc, found"):
+        open_local_index(path, "abc")
+    path.write_bytes(b"nothing")
+    with pytest.raises(IntegrityError, match=r"must have sha256 abc, found"):
+        open_local_index(path, "abc")
+    path.unlink()
+    with pytest.raises(IntegrityError, match="is missing; fetch it again"):
+        open_local_index(path, "abc")
+
+
+def test_bytes_in_memory_are_read_like_a_file(path: Path) -> None:
+    index = IndexTable(IndexFile(pa.BufferReader(path.read_bytes()), "there"))
+    assert index.row_at(5) == IndexTable(open_it(path)).row_at(5)
+
+
+def test_an_index_of_no_rows_has_none(tmp_path: Path) -> None:
+    write_index(tmp_path / INDEX_NAME, SCHEMA.empty_table())
+    index = IndexTable(open_it(tmp_path / INDEX_NAME))
+    assert (len(index), index.texts("key"), index.counts("split")) == (0, [], {})
+    assert index.codes("shard")[1] == ()
+    with pytest.raises(IndexError):
+        index.row_at(0)
