@@ -195,3 +195,22 @@ def inspect_release(
 ) -> None:
     """List a release, or show one clip and draw it."""
     _load("inspect").inspect_release(release, key, out, rerun, limit, weights)
+
+
+@app.command("audit-run")
+def audit_run(
+    ledger: Annotated[Path, typer.Argument(metavar="LEDGER", help="Folder in which a loader recorded its steps.")],
+    release: Annotated[
+        list[str] | None,
+        typer.Option("--release", help="Release of the run: every step is compared with the plan. Repeatable."),
+    ] = None,
+    selection: Annotated[
+        list[str] | None,
+        typer.Option("--selection", help="Selection file of the run that is not in its release. Repeatable."),
+    ] = None,
+    clip: Annotated[str | None, typer.Option("--clip", help="Show the steps that brought this clip.")] = None,
+    epoch: Annotated[int | None, typer.Option("--epoch", min=0, help="Epoch of --step.")] = None,
+    step: Annotated[int | None, typer.Option("--step", min=0, help="Show what this step brought.")] = None,
+) -> None:
+    """Prove from its ledger that a training run saw each clip once an epoch."""
+    _load("audit_run").audit_run(ledger, release or [], selection or [], clip, epoch, step)

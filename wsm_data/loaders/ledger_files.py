@@ -169,19 +169,21 @@ def _session(data: memoryview, path: Path) -> dict[str, Any] | None:
 
 
 def _frame_at(data: memoryview, place: int, path: Path) -> tuple[bytes, memoryview] | None:
-    """Tag and payload of the frame at a byte; None at the end, also where only a part of a frame or zeros follow."""
+    """Tag and payload of the frame at a byte; None at the end, also where only a part of a frame follows.
+
+    Zeros count as not written: a file system leaves them for blocks it had not written when power failed.
+    """
     rest = data[place:]
-    if len(rest) >= HEAD.size:
-        tag, size = HEAD.unpack(rest[: HEAD.size])
+    tag, size = HEAD.unpack(rest[: HEAD.size]) if len(rest) >= HEAD.size else (b"", 0)
+    if tag not in (SESSION, START, STEP, DONE) or size > _MAX_PAYLOAD_BYTES:
+        size = 0
+    elif len(rest) >= HEAD.size + size + CHECKSUM.size:
         end = HEAD.size + size
-        known = tag in (SESSION, START, STEP, DONE) and size <= _MAX_PAYLOAD_BYTES
-        if known and len(rest) < end + CHECKSUM.size:
-            return None
-        if known and CHECKSUM.unpack(rest[end : end + CHECKSUM.size])[0] == xxhash.xxh3_64_intdigest(rest[:end]):
+        if CHECKSUM.unpack(rest[end : end + CHECKSUM.size])[0] == xxhash.xxh3_64_intdigest(rest[:end]):
             return tag, rest[HEAD.size : end]
-        if any(rest):  # zeros are what a file system leaves of blocks it had not written when power failed
-            raise IntegrityError(
-                f"{path}: the record at byte {place} must have the checksum it was written with, found other bytes; "
-                "restore the file"
-            )
-    return None
+    if len(bytes(rest).rstrip(b"\0")) < HEAD.size + size + CHECKSUM.size:
+        return None
+    raise IntegrityError(
+        f"{path}: the record at byte {place} must have the checksum it was written with, found other bytes; "
+        "restore the file"
+    )

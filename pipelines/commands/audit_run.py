@@ -1,0 +1,140 @@
+"""`wsm audit-run`: the proof that a run saw each clip as often as its plan says, and when it saw which."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import typer
+
+from wsm_data.errors import ConfigError, IntegrityError
+from wsm_data.loaders.audit_run import EpochAudit, audit_epochs, sightings
+from wsm_data.loaders.ledger_sources import open_recorded_sources, recorded_order, refs_of_key
+from wsm_data.loaders.ledger_timeline import Timeline, read_timeline
+from wsm_data.loaders.source_table import Sources
+from wsm_data.view.text_table import aligned
+
+
+def audit_run(
+    folder: Path,
+    releases: Sequence[str],
+    selections: Sequence[str],
+    clip: str | None,
+    epoch: int | None,
+    step: int | None,
+) -> None:
+    """Print what a ledger proves, or when a clip was seen, or what a step brought.
+
+    Args:
+        folder: the ledger.
+        releases: paths or URLs of the releases of the run, in any order; empty to audit without them.
+        selections: selection files of the run that do not stand in their release.
+        clip: key of a clip.
+        epoch: epoch of a step.
+        step: the step.
+
+    Raises:
+        ConfigError: the question or the releases are wrong.
+        IntegrityError: something in the ledger does not fit.
+    """
+    if (epoch is None) != (step is None) or (clip is not None and step is not None):
+        raise ConfigError("ask for one clip by --clip, or for one step by --epoch and --step together")
+    if clip is not None and not releases:
+        raise ConfigError("a ledger records the numbers of clips: to find --clip, give the releases by --release")
+    timeline = read_timeline(folder)
+    sources = open_recorded_sources(timeline.identity, releases, selections) if releases else None
+    if clip is not None and sources is not None:
+        _print_clip(timeline, sources, clip)
+    elif epoch is not None and step is not None:
+        _print_step(timeline, sources, epoch, step)
+    else:
+        _print_audit(timeline, sources, folder)
+
+
+def _print_clip(timeline: Timeline, sources: Sources, key: str) -> None:
+    rows = [("epoch", "step", "rank", "of", "session", "")]
+    for seen in sightings(timeline, refs_of_key(sources, key)):
+        place = (f"{seen.epoch:,}", f"{seen.step:,}", str(seen.rank), str(seen.world_size), seen.session)
+        rows.append((*place, "" if seen.counts else "lost with its run, trained again"))
+    typer.echo(aligned(rows, right=range(4)) if len(rows) > 1 else f"{key} was not delivered at any recorded step")
+
+
+def _print_step(timeline: Timeline, sources: Sources | None, epoch: int, step: int) -> None:
+    records = {record.epoch: record for record in timeline.epochs}
+    stretches = records[epoch].stretches if epoch in records else ()
+    found = [stretch for stretch in stretches if stretch.start <= step < stretch.end]
+    if not found:
+        spans = (f"{one.epoch} (steps 0 to {one.steps})" for one in records.values())
+        raise ConfigError(
+            f"step {step} of epoch {epoch} was not recorded by all ranks; there are epochs {', '.join(spans)}"
+        )
+    rows = [("rank", "ref", *(("clip",) if sources else ()))]
+    for rank, refs in enumerate(found[0].refs(step)):
+        keys = sources.keys(refs) if sources else None
+        rows += [(str(rank), str(ref), *((keys[i],) if keys else ())) for i, ref in enumerate(refs.tolist())]
+    typer.echo(aligned(rows, right=(0, 1)))
+
+
+def _print_audit(timeline: Timeline, sources: Sources | None, folder: Path) -> None:
+    audits = audit_epochs(timeline, sources)
+    typer.echo(_head(timeline) + "\n\n" + _epoch_table(audits) + "\n")
+    for again in timeline.again:
+        typer.echo(
+            f"epoch {again.epoch}: steps {again.start} to {again.end} of session {again.session} were lost with it and "
+            "trained again"
+        )
+    if timeline.ahead:
+        typer.echo(f"the last session: rank 0 recorded {timeline.ahead} steps at its end that another rank has not")
+    misfits = [*timeline.misfits, *(misfit for audit in audits for misfit in audit.misfits)]
+    if not any(audit.recorded for audit in audits):
+        misfits.append("at least one step must have been recorded by all ranks, found none")
+    if misfits:
+        raise IntegrityError(f"{folder} does not prove an uninterrupted course:\n  " + "\n  ".join(misfits))
+    typer.echo(_verdict(audits, compared=sources is not None))
+
+
+def _head(timeline: Timeline) -> str:
+    order = recorded_order(timeline.identity)
+    worlds = sorted({file.world_size for file in timeline.files})
+    killed = sum(not file.closed for file in timeline.files)
+    rows = [("ledger of", "release", "split", "selection", "clips", "weight")]
+    for source in timeline.identity["sources"]:
+        names = (source["release"], source["release_digest"][:16], source["split"] or "all", source["selection"] or "-")
+        rows.append((*names, f"{source['clips']:,}", f"{source['weight']:g}"))
+    return (
+        aligned(rows, right=(4, 5))
+        + f"\nseed {order.seed}, global batch {order.global_batch}, remainder {order.remainder}, {order.arrangement}; "
+        f"world size {', '.join(map(str, worlds))}; {len(timeline.files)} files, {killed} of them not closed"
+    )
+
+
+def _epoch_table(audits: Sequence[EpochAudit]) -> str:
+    rows = [("epoch", "steps", "of", "clips seen", "once", "more often", "never", "explained by the plan")]
+    for audit in audits:
+        steps = (f"{audit.epoch:,}", f"{audit.recorded:,}", f"{audit.steps:,}", f"{audit.delivered:,}")
+        times = (f"{audit.seen_once:,}", f"{audit.seen_more:,}", f"{audit.never:,}")
+        rows.append((*steps, *times, _explained(audit)))
+    return aligned(rows, right=range(7))
+
+
+def _explained(audit: EpochAudit) -> str:
+    if audit.misfits:
+        return "does not fit"
+    if not audit.complete:
+        return "not complete"
+    if audit.plan is None:
+        return "counts fit"
+    parts = (
+        (audit.plan.dropped_clips, "clips dropped"),
+        (audit.plan.repeated_rows, "rows repeated"),
+        (audit.plan.padded_rows, "rows empty"),
+    )
+    return ", ".join(f"{count:,} {words}" for count, words in parts if count) or "every clip"
+
+
+def _verdict(audits: Sequence[EpochAudit], *, compared: bool) -> str:
+    complete = [audit.epoch for audit in audits if audit.complete]
+    proof = (
+        "every recorded step brought what the plan says"
+        if compared
+        else "the counts are those of the sources; --release compares every step with the plan"
+    )
+    return f"{len(complete)} of {len(audits)} epochs complete, no step missing, none twice: {proof}"
