@@ -99,7 +99,8 @@ _OPTIONS: dict[str, tuple[Any, Any]] = {
 
 _OUT_OPTIONAL = (
     Annotated[
-        Path | None, typer.Option("--out", "-o", help="Folder to write; verify needs none, report takes report/.")
+        Path | None,
+        typer.Option("--out", "-o", help="Folder to write; verify needs none, others take one named like the command."),
     ],
     None,
 )
@@ -115,14 +116,16 @@ def _command(
     call: Callable[..., None],
     *,
     arguments: Mapping[str, Any] = _NO_ARGUMENTS,
+    own_options: Mapping[str, tuple[Any, Any]] = _NO_ARGUMENTS,
     epilog: str = "",
 ) -> None:
-    """Register a command that takes `arguments` (annotations by name) and then all of `_OPTIONS`."""
+    """Register a command that takes `arguments` (annotations by name), options of its own, and all of `_OPTIONS`."""
+    options = {**own_options, **_OPTIONS} | ({"out": _OUT_OPTIONAL} if "release" in arguments else {})
     parameters = [
         *(inspect.Parameter(one, inspect.Parameter.KEYWORD_ONLY, annotation=kind) for one, kind in arguments.items()),
         *(
             inspect.Parameter(one, inspect.Parameter.KEYWORD_ONLY, annotation=kind, default=default)
-            for one, (kind, default) in (_OPTIONS | ({"out": _OUT_OPTIONAL} if "release" in arguments else {})).items()
+            for one, (kind, default) in options.items()
         ),
     ]
 
@@ -149,11 +152,31 @@ def _recipe_list() -> str:
     return "\n".join(["\b", "Recipes:", *(f"  {name}: {summary}" for name, summary in recipe_summaries().items())])
 
 
+_SELECT_OPTIONS: Mapping[str, tuple[Any, Any]] = MappingProxyType(
+    {
+        "report": (Annotated[bool, typer.Option("--report", help="Write NAME.html: what was chosen, and why.")], False),
+        "materialise": (
+            Annotated[
+                Path | None,
+                typer.Option("--materialise", help="Folder for the chosen clips as a release of their own, verified."),
+            ],
+            None,
+        ),
+        "weights": (
+            Annotated[str, typer.Option("--weights", help="Folder of the codec's weights, for pictures.")],
+            "",
+        ),
+    }
+)
+
+
 def _add_stage_command(entry: StageEntry) -> None:
     arguments = {"release": ReleaseArgument} if entry.reads_release else {}
-    _command(
-        entry.name, entry.summary, lambda **values: _load("stages").run_one(entry.name, **values), arguments=arguments
-    )
+    if entry.name == "select":
+        call, own = (lambda **values: _load("select").run_select(**values)), _SELECT_OPTIONS
+    else:
+        call, own = (lambda **values: _load("stages").run_one(entry.name, **values)), _NO_ARGUMENTS
+    _command(entry.name, entry.summary, call, arguments=arguments, own_options=own)
 
 
 for _entry in STAGES:

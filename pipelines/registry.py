@@ -31,7 +31,9 @@ STAGES: tuple[StageEntry, ...] = (
     StageEntry(name="encode", summary="Turn trajectories into clips of latents and poses."),
     StageEntry(name="pack", summary="Pack clips into a release of indexed shards."),
     StageEntry(name="verify", summary="Prove that a release is whole, or name the damage.", reads_release=True),
+    StageEntry(name="score", summary="Score how hard every clip of a release is.", reads_release=True),
     StageEntry(name="report", summary="Show a release in one HTML file with pictures.", reads_release=True),
+    StageEntry(name="select", summary="Choose the hard share of a release, with reasons.", reads_release=True),
 )
 
 

@@ -11,16 +11,17 @@ from pipelines.config import config_json, input_fields
 from pipelines.registry import load_stage
 from pipelines.report import StageReport, summary_table
 from pipelines.runner import RunOptions, run_stage
+from pipelines.stage import Stage
 from pipelines.upstream import UpstreamMissing
 from wsm_data.shards.names import MANIFEST_NAME
 
 _SHOWN_UNITS = 20
 
 
-def show_stage(name: str, config: Any, out: Path, options: RunOptions) -> None:
+def show_stage(stage: Stage[Any], config: Any, out: Path, options: RunOptions) -> None:
     """Print the settings of one stage and what it would do."""
-    _show_settings(name, config)
-    report = run_stage(load_stage(name), config, out, options)
+    _show_settings(stage.name, config)
+    report = run_stage(stage, config, out, options)
     _show_units(report)
     typer.echo(summary_table([report]))
 

@@ -17,12 +17,17 @@ from pipelines.recipe import Recipe, load_recipe, stage_config, stage_sections
 from pipelines.registry import load_stage, load_stage_module
 from pipelines.report import summary_table
 from pipelines.runner import RunOptions, fingerprint, run_stage
+from pipelines.stage import Stage
 from wsm_data.codecs.registry import CodecConfig, describe_codec
 from wsm_data.errors import ConfigError
 from wsm_data.files.digest import digest_json
 from wsm_data.files.typed_toml import build_config, load_toml
 
-_RESULTS: Mapping[str, tuple[str, str]] = {"pack": ("release", "release"), "report": ("report", "report.html")}
+_RESULTS: Mapping[str, tuple[str, str]] = {
+    "pack": ("release", "release"),
+    "score": ("scores", "scores.parquet"),
+    "report": ("report", "report.html"),
+}
 """What a stage makes for people to look at: what it is called, and where in the stage's folder it lies."""
 
 
@@ -52,20 +57,41 @@ def run_one(
         clips = load_stage_module(name).require_sound(release, options["quiet"])
         typer.echo(f"{release} is whole: {clips} clips, every byte and every trajectory accounted for")
         return
+    built = stage_settings(name, config, assignments, release)
+    folder = run_built(load_stage(name), built, out or Path(name), options)
+    if not options["dry_run"]:
+        _print_result(name, folder)
+
+
+def stage_settings(
+    name: str, config: Path | None, assignments: Sequence[str] | None, release: str | None = None
+) -> Any:
+    """Settings of a stage, from its section of a TOML file and from `--set`.
+
+    Raises:
+        ConfigError: a setting is wrong, or an input is missing.
+    """
     stage = load_stage(name)
     values = stage_sections(load_toml(config), str(config)).get(name, {}) if config else {}
     given = {"release": release} if release else {}
     values = merge(merge(values, given), parse_assignments(assignments or ()))
     _require_inputs(name, stage.config_type, values)
-    built = build_config(stage.config_type, values, "")
-    engine_name = options.pop("engine")
-    run_options = _options(options)
-    if run_options.dry_run:
-        show_stage(name, built, out or Path(name), run_options)
-        return
-    report = run_stage(stage, built, out or Path(name), run_options, engine(engine_name))
+    return build_config(stage.config_type, values, "")
+
+
+def run_built(stage: Stage[Any], config: Any, out: Path, options: Mapping[str, Any]) -> Path:
+    """Run a stage, or show what it would do, and print its table; returns its folder (another one after a fork).
+
+    Raises:
+        ConfigError: an input or an option is wrong.
+    """
+    chosen = _options({name: value for name, value in options.items() if name != "engine"})
+    if chosen.dry_run:
+        show_stage(stage, config, out, chosen)
+        return out
+    report = run_stage(stage, config, out, chosen, engine(options["engine"]))
     typer.echo(summary_table([report]))
-    _print_result(name, report.out)
+    return report.out
 
 
 def run_recipe(recipe: str, out: Path, config: Path | None, assignments: Sequence[str] | None, **options: Any) -> None:

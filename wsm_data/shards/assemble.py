@@ -77,18 +77,52 @@ def finish_release(
         IntegrityError: a shard is missing, or has not the size its plan says.
     """
     begin_release(folder)
-    _require_shards(folder, plans, shards)
+    require_shards(folder, plans, shards)
     table, rgb, depth = _collect(facts, plans, read_info)
-    write_index(folder / INDEX_NAME, table)
+    content = ReleaseContent(table=table, shards=shards, rgb_statistics=rgb, depth_statistics=depth)
+    return write_release_files(folder, facts, content, inventory, refusals)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ReleaseContent:
+    """What was counted in the clips of a release.
+
+    Attributes:
+        table: columns of the index.
+        shards: the shards, by name.
+        rgb_statistics: by which colour latents are standardised.
+        depth_statistics: by which depth latents are standardised.
+    """
+
+    table: pa.Table
+    shards: Sequence[ShardInfo]
+    rgb_statistics: LatentStatistics
+    depth_statistics: LatentStatistics
+
+
+def write_release_files(
+    folder: Path,
+    facts: ReleaseFacts,
+    content: ReleaseContent,
+    inventory: Sequence[InventoryRow],
+    refusals: Iterable[Mapping[str, object]],
+) -> ReleaseManifest:
+    """Write everything beside the shards of a begun release, remove other shards, and write dataset.json last."""
+    write_index(folder / INDEX_NAME, content.table)
     write_inventory(folder / INVENTORY_NAME, inventory)
     write_quarantine(folder / QUARANTINE_NAME, refusals)
-    manifest = _manifest(folder, facts, shards, IndexTable(table), inventory, rgb, depth)
-    _remove_other_shards(folder, {shard.name for shard in shards})
+    manifest = _manifest(folder, facts, content, inventory)
+    _remove_other_shards(folder, {shard.name for shard in content.shards})
     write_bytes(folder / MANIFEST_NAME, manifest_bytes(manifest))
     return manifest
 
 
-def _require_shards(folder: Path, plans: Sequence[ShardPlan], shards: Sequence[ShardInfo]) -> None:
+def require_shards(folder: Path, plans: Sequence[ShardPlan], shards: Sequence[ShardInfo]) -> None:
+    """Check that the shards of a release are those that were planned.
+
+    Raises:
+        IntegrityError: a shard is missing, or has not the size its plan says.
+    """
     for plan, shard in zip(plans, shards, strict=True):
         path = folder / plan.name
         found = path.stat().st_size if path.exists() else None
@@ -136,14 +170,9 @@ def _require_same(facts: ReleaseFacts, info: FragmentInfo) -> FragmentInfo:
 
 
 def _manifest(
-    folder: Path,
-    facts: ReleaseFacts,
-    shards: Sequence[ShardInfo],
-    index: IndexTable,
-    inventory: Sequence[InventoryRow],
-    rgb: LatentStatistics,
-    depth: LatentStatistics,
+    folder: Path, facts: ReleaseFacts, content: ReleaseContent, inventory: Sequence[InventoryRow]
 ) -> ReleaseManifest:
+    index = IndexTable(content.table)
     return ReleaseManifest(
         name=facts.name,
         clips=len(index),
@@ -151,13 +180,13 @@ def _manifest(
         latents=int(index.numbers("latents").sum()),
         clips_by_split=index.counts("split"),
         clips_by_group=index.counts("group"),
-        shards=tuple(shards),
+        shards=tuple(content.shards),
         index_sha256=sha256_file(folder / INDEX_NAME),
         inventory_sha256=sha256_file(folder / INVENTORY_NAME),
         quarantine_sha256=sha256_file(folder / QUARANTINE_NAME),
         codec=facts.codec,
-        rgb_statistics=rgb,
-        depth_statistics=depth,
+        rgb_statistics=content.rgb_statistics,
+        depth_statistics=content.depth_statistics,
         depth_range=facts.depth_range,
         encoded_width_px=facts.encoded_width_px,
         encoded_height_px=facts.encoded_height_px,

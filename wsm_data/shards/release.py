@@ -49,18 +49,38 @@ class Release:
             ConfigError: the release has no such clip.
             IntegrityError: names shard, clip and member that are damaged; or the clip's codec is not the release's.
         """
-        row = self.index.row(key)
-        where = f"{row.shard}, clip {key}"
+        return self.read_row(self.index.row(key), verify)
+
+    def read_row(self, row: IndexRow, verify: bool = True) -> Clip:
+        """Read the clip of a row of the index, as `read_clip` does.
+
+        Raises:
+            IntegrityError: as `read_clip`.
+        """
+        where = f"{row.shard}, clip {row.key}"
         data = memoryview(self._read(row, where))
         if verify:
             check_members(data, row.members, where)
         clip = decode_clip(data, row.members, where)
-        if (clip.meta.key, clip.meta.codec_digest) != (key, self.manifest.codec.digest):
+        if (clip.meta.key, clip.meta.codec_digest) != (row.key, self.manifest.codec.digest):
             raise IntegrityError(
                 f"{where}: the meta data must be of this clip and codec digest {self.manifest.codec.digest}, found "
                 f"{clip.meta.key} and {clip.meta.codec} with {clip.meta.codec_digest}"
             )
         return clip
+
+    def read_clip_bytes(self, key: str) -> bytes:
+        """Read a clip as it stands in its shard: tar headers, members and padding.
+
+        Raises:
+            ConfigError: the release has no such clip.
+            IntegrityError: names shard, clip and member that are damaged.
+        """
+        row = self.index.row(key)
+        where = f"{row.shard}, clip {key}"
+        data = self._read(row, where)
+        check_members(memoryview(data), row.members, where)
+        return data
 
     def require_codec(self, codec: CodecInfo) -> None:
         """Check that latents of this release may be decoded by `codec`, or mixed with others of it.

@@ -154,7 +154,7 @@ def read_selection(release: Store | str | Path, name: str, release_digest: str) 
         IntegrityError: the file is damaged, or is no selection of this version.
     """
     store = open_store(release) if isinstance(release, str | Path) else release
-    where, data = _stored(store, name)
+    where, data = selection_file(store, name)
     selection = parse_selection(data, where)
     if selection.release_digest != release_digest:
         raise ConfigError(
@@ -208,8 +208,16 @@ def _whole(column: pa.ChunkedArray) -> pa.StringArray:
     return pa.concat_arrays(column.chunks) if column.num_chunks else pa.array([], pa.string())
 
 
-def _stored(release: Store, name: str) -> tuple[str, bytes]:
-    """Place and content of the file that a name or a path stands for."""
+def selection_file(release: Store, name: str) -> tuple[str, bytes]:
+    """Place and content of the file of a selection.
+
+    Args:
+        release: the release.
+        name: name of a selection that stands in the release, or path or URL of a file that ends in `.parquet`.
+
+    Raises:
+        ConfigError: there is no such selection.
+    """
     if is_selection_file(name):
         folder, slash, file = name.rpartition("/")
         store, listed = open_store(folder + slash if slash else "."), ""

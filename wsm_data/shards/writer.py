@@ -1,7 +1,7 @@
 """Fragments put one after the other: a shard."""
 
 import hashlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 import xxhash
@@ -31,16 +31,34 @@ def write_shard(path: Path, plan: ShardPlan, path_of: Callable[[str], Path]) -> 
         IntegrityError: names the clip whose fragment is missing or disagrees with its sidecar or with the plan.
         ValueError: the file name is not the plan's.
     """
+    return write_blocks(path, plan, lambda clip: _checked_blocks(path_of(clip.key), clip))
+
+
+def write_blocks(path: Path, plan: ShardPlan, blocks_of: Callable[[PlannedClip], Iterable[bytes]]) -> ShardInfo:
+    """Write the shard of a plan at `path`, atomically, from the bytes of its clips.
+
+    Args:
+        path: where the shard goes; its name must be that of the plan.
+        plan: the clips and their order.
+        blocks_of: bytes of a clip: tar headers, members and padding; as many as are planned.
+
+    Raises:
+        IntegrityError: the bytes of a clip are more or fewer than planned.
+        ValueError: the file name is not the plan's.
+    """
     if path.name != plan.name:
         raise ValueError(f"the shard {plan.name} must be written under its own name, found {path.name}")
     digest = hashlib.sha256()
     size = 0
     with atomic_file(path) as file:
         for clip in plan.clips:
-            for block in _checked_blocks(path_of(clip.key), clip):
+            before = size
+            for block in blocks_of(clip):
                 file.write(block)
                 digest.update(block)
                 size += len(block)
+            if size - before != clip.size_bytes:
+                raise IntegrityError(f"clip {clip.key} must have {clip.size_bytes} bytes, found {size - before}")
         file.write(END_OF_ARCHIVE)
         digest.update(END_OF_ARCHIVE)
     return ShardInfo(
