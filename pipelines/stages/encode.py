@@ -221,5 +221,5 @@ def _finish(config: EncodeConfig, context: StageContext, settled: Settled) -> Fi
 
 
 STAGE = Stage(
-    name="encode", version=2, config_type=EncodeConfig, list_units=_list_units, process=_process, finish=_finish
+    name="encode", version=3, config_type=EncodeConfig, list_units=_list_units, process=_process, finish=_finish
 )

@@ -3,21 +3,18 @@
 from collections.abc import Iterator, Sequence
 from typing import TypeVar
 
-import cv2
 import numpy as np
 from numpy.typing import DTypeLike
 
 from wsm_data.codecs.base import TEMPORAL_RATIO
-from wsm_data.codecs.depth import is_measured, log_depth_table
-from wsm_data.codecs.images import decode_depth, decode_rgb, resize_depth, resize_rgb
+from wsm_data.codecs.depth import log_depth_table, measured_table
+from wsm_data.codecs.images import decode_depth, decode_rgb
+from wsm_data.codecs.resize import resize_colour, resize_depth
 from wsm_data.errors import DataError, Reason
 from wsm_data.schema.arrays import BoolArray, Float32Array, Uint8Array, Uint16Array
 from wsm_data.schema.depth import DepthEncoding, DepthRange
 
 _Image = TypeVar("_Image", Uint8Array, Uint16Array)
-_HALF_RANGE = np.float32(127.5)
-_COLOURS = (np.arange(256, dtype=np.float32) - _HALF_RANGE) / _HALF_RANGE
-"""What each of the 256 levels becomes; float32 [256] in [-1, 1]."""
 
 
 class VideoMemory:
@@ -57,7 +54,7 @@ def rgb_video(
         memory: where the video is put, and stays until the next one is; memory of its own where None.
 
     Returns:
-        float32 [length, height, width, 3] in [-1, 1]: rgb / 127.5 - 1.
+        float32 [length, height, width, 3] in [-1, 1]: area means over 127.5, less 1.
 
     Raises:
         DataError: FRAME_UNDECODABLE; FRAME_SIZE_MISMATCH where a frame's size differs from the first one's.
@@ -66,7 +63,7 @@ def rgb_video(
     video = memory.array("rgb", (_padded_count(frames, length), height, width, 3), np.float32)
     decoded = (decode_rgb(data, _frame_name(where, "colour", index)) for index, data in enumerate(frames))
     for index, rgb_u8 in enumerate(_of_one_size(decoded, where, "colour")):
-        cv2.LUT(resize_rgb(rgb_u8, width, height), _COLOURS, dst=video[index])
+        resize_colour(rgb_u8, video[index])
     video[len(frames) :] = video[len(frames) - 1]
     return video
 
@@ -101,15 +98,13 @@ def depth_video(
         DataError: FRAME_UNDECODABLE, DEPTH_NOT_16_BIT; FRAME_SIZE_MISMATCH where a frame's size differs from the
             first one's.
     """
-    normalised = log_depth_table(encoding, depth_range)
+    normalised, measured = log_depth_table(encoding, depth_range), measured_table(encoding)
     memory = memory or VideoMemory()
     channel = memory.array("depth", (_padded_count(frames, length), height, width), np.float32)
     valid = memory.array("valid", channel.shape, np.bool_)
     decoded = (decode_depth(data, _frame_name(where, "depth", index)) for index, data in enumerate(frames))
     for index, raw_u16 in enumerate(_of_one_size(decoded, where, "depth")):
-        codes = resize_depth(raw_u16, width, height)
-        np.take(normalised, codes, out=channel[index], mode="clip")  # every code is in the table; "raise" would buffer
-        valid[index] = is_measured(codes, encoding)
+        resize_depth(raw_u16, normalised, measured, channel[index], valid[index])
     for video in (channel, valid):
         video[len(frames) :] = video[len(frames) - 1]
     return _three_channels(channel), valid

@@ -30,6 +30,11 @@ def log_depth_table(encoding: DepthEncoding, depth_range: DepthRange) -> Float32
     return normalise_depth(depth_m_from_raw(np.arange(_RAW_CODES, dtype=np.uint16), encoding), depth_range)
 
 
+def measured_table(encoding: DepthEncoding) -> BoolArray:
+    """Whether each raw code is a measurement, bool [65536]."""
+    return is_measured(np.arange(_RAW_CODES, dtype=np.uint16), encoding)
+
+
 def depth_m_from_raw(raw_u16: Uint16Array, encoding: DepthEncoding) -> Float32Array:
     """Depth of raw codes in metres along the optical axis, float32 in the shape of `raw_u16`; 0 = no measurement.
 

@@ -1,9 +1,10 @@
-"""From the bytes of one stored frame to pixels at the encoded size."""
+"""From the bytes of one stored frame to its pixels."""
 
 import cv2
 import numpy as np
 import simplejpeg
 
+from wsm_data.codecs.png16 import decode_png16
 from wsm_data.errors import DataError, Reason
 from wsm_data.schema.arrays import Uint8Array, Uint16Array
 
@@ -30,6 +31,8 @@ def decode_rgb(data: bytes, where: str) -> Uint8Array:
 def decode_depth(data: bytes, where: str) -> Uint16Array:
     """Decode a 16-bit grey PNG, uint16 [H, W] in the raw codes of the source.
 
+    OpenCV has the last word on what is not plain and whole: what other kinds of PNG hold, and what is damaged.
+
     Args:
         data: the bytes of the file.
         where: unit and frame, for the message.
@@ -37,6 +40,9 @@ def decode_depth(data: bytes, where: str) -> Uint16Array:
     Raises:
         DataError: FRAME_UNDECODABLE, or DEPTH_NOT_16_BIT where the image has 8 bits or several channels.
     """
+    plain = decode_png16(data)
+    if plain is not None:
+        return plain
     try:
         image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     except cv2.error as error:  # an empty buffer
@@ -53,25 +59,3 @@ def decode_depth(data: bytes, where: str) -> Uint16Array:
 def _undecodable(kind: str, wanted: str, data: bytes, where: str, cause: str) -> DataError:
     message = f"{where}: a {kind} image must be {wanted}, found {len(data)} bytes that do not decode ({cause})"
     return DataError(Reason.FRAME_UNDECODABLE, f"{message}; fetch the file again", {"size_bytes": len(data)})
-
-
-def resize_rgb(rgb_u8: Uint8Array, width: int, height: int) -> Uint8Array:
-    """Resize per axis by the mean over each target pixel's area, rgb_u8 [height, width, 3]."""
-    return cv2.resize(rgb_u8, (width, height), interpolation=cv2.INTER_AREA)
-
-
-def resize_depth(raw_u16: Uint16Array, width: int, height: int) -> Uint16Array:
-    """Take for each target pixel the source pixel in which its centre lies, uint16 [height, width].
-
-    Every value that comes out went in. An average would invent surfaces between a table's edge and the wall behind it,
-    and would mix the codes that mean "no measurement" into distances. Pixel areas scale as in `Intrinsics.resized`, so
-    target x reads source floor((x + 1/2) s) with s = source width / target width, in whole numbers: OpenCV's fixed
-    point falls to either side where a centre lies on the border of two pixels, as all do from 640 to 320.
-    """
-    rows = _source_indices(raw_u16.shape[0], height)
-    columns = _source_indices(raw_u16.shape[1], width)
-    return raw_u16[rows].take(columns, axis=1)
-
-
-def _source_indices(before: int, after: int) -> np.ndarray:
-    return (2 * np.arange(after) + 1) * before // (2 * after)

@@ -7,8 +7,9 @@ from hypothesis import strategies as st
 
 from wsm_data.codecs.clip_video import VideoMemory, depth_video, pad_frames, padded_length, rgb_video
 from wsm_data.codecs.dct import DctCodec
-from wsm_data.codecs.depth import log_depth_table
-from wsm_data.codecs.images import decode_rgb, resize_depth, resize_rgb
+from wsm_data.codecs.depth import log_depth_table, measured_table
+from wsm_data.codecs.images import decode_rgb
+from wsm_data.codecs.resize import resize_colour, resize_depth
 from wsm_data.errors import DataError, Reason
 from wsm_data.schema.depth import DepthEncoding, DepthRange
 
@@ -22,8 +23,9 @@ def test_a_colour_video_is_the_resized_frames_over_minus_one_to_one(rgb_frames):
     assert video.dtype == np.float32
     assert video.shape == (3, 32, 64, 3)
     for t, data in enumerate(rgb_frames):
-        rgb_u8 = resize_rgb(decode_rgb(data, WHERE), 64, 32)
-        np.testing.assert_allclose(video[t], rgb_u8 / 127.5 - 1, atol=1e-7)
+        wanted = np.empty((32, 64, 3), np.float32)
+        resize_colour(decode_rgb(data, WHERE), wanted)
+        assert np.array_equal(video[t], wanted)
 
 
 @pytest.mark.parametrize(("level", "value"), [(0, -1), (255, 1)])
@@ -34,12 +36,12 @@ def test_black_and_white_are_the_ends_of_the_range_exactly(level, value):
 
 def test_a_depth_video_is_the_table_of_the_nearest_codes(depth_frames, depth_images):
     video, valid = depth_video(depth_frames, ENCODING, RANGE, 64, 32, WHERE)
-    table = log_depth_table(ENCODING, RANGE)
     for t, raw in enumerate(depth_images):
-        codes = resize_depth(raw, 64, 32)
+        wanted, measured = np.empty((32, 64), np.float32), np.empty((32, 64), bool)
+        resize_depth(raw, log_depth_table(ENCODING, RANGE), measured_table(ENCODING), wanted, measured)
         for channel in range(3):
-            assert np.array_equal(video[t, ..., channel], table[codes])
-        assert np.array_equal(valid[t], (codes != 0) & (codes != 65535))
+            assert np.array_equal(video[t, ..., channel], wanted)
+        assert np.array_equal(valid[t], measured)
 
 
 def test_pixels_without_measurement_are_far_and_not_valid(depth_frames):

@@ -8,6 +8,7 @@ from wsm_data.codecs.depth import (
     depth_m_from_raw,
     is_measured,
     log_depth_table,
+    measured_table,
     normalise_depth,
     valid_share,
 )
@@ -70,6 +71,12 @@ def test_metres_come_back_through_the_video(depth_m):
 def test_decoded_channels_are_averaged_then_clamped():
     video = np.array([[[[-0.3, 0.0, 0.3]], [[1.5, 1.2, 1.8]], [[-3.0, -1.0, -1.0]]]], np.float32)
     np.testing.assert_allclose(depth_m_from_latent_video(video, RANGE)[0, :, 0], [1.0, 5.0, 0.2], rtol=1e-6)
+
+
+def test_the_table_of_measured_codes_says_of_each_what_is_said_of_images():
+    encoding = DepthEncoding(metres_per_unit=1e-3, invalid_codes=(0, 7))
+    assert np.flatnonzero(~measured_table(encoding)).tolist() == [0, 7]
+    assert len(measured_table(encoding)) == 65536
 
 
 def test_the_valid_share_counts_frame_0_alone_and_then_four_at_a_time():

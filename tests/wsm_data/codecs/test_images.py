@@ -1,14 +1,12 @@
-from fractions import Fraction
-from math import floor
+import zlib
 
 import cv2
 import numpy as np
 import pytest
 import simplejpeg
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from wsm_data.codecs.images import decode_depth, decode_rgb, resize_depth, resize_rgb
+from wsm_data.codecs.images import decode_depth, decode_rgb
+from wsm_data.codecs.png16 import decode_png16
 from wsm_data.errors import DataError, Reason
 
 WHERE = "gibson_d435i/Adrian/000003, frame 7"
@@ -83,32 +81,10 @@ def test_a_png_that_is_not_16_bit_grey_is_refused_as_such(image):
     assert refusal(decode_depth, cv2.imencode(".png", image)[1].tobytes()) is Reason.DEPTH_NOT_16_BIT
 
 
-def test_colour_is_averaged_over_areas():
-    image = np.arange(4 * 6 * 3, dtype=np.uint8).reshape(4, 6, 3)
-    wanted = np.rint(image.reshape(2, 2, 3, 2, 3).mean(axis=(1, 3)) + 1e-9)
-    assert np.abs(resize_rgb(image, 3, 2) - wanted).max() <= 1  # halves may go either way
-
-
-@settings(max_examples=40, deadline=None)
-@given(
-    source=st.tuples(st.integers(1, 70), st.integers(1, 70)), target=st.tuples(st.integers(1, 50), st.integers(1, 50))
-)
-def test_depth_takes_the_pixel_in_which_the_centre_lies(source, target):
-    def picked(before, after):
-        return [floor((i + Fraction(1, 2)) * Fraction(before, after)) for i in range(after)]
-
-    raw = np.random.default_rng(0).integers(0, 65536, source).astype(np.uint16)
-    resized = resize_depth(raw, target[1], target[0])
-    assert np.array_equal(resized, raw[np.ix_(picked(source[0], target[0]), picked(source[1], target[1]))])
-
-
-@pytest.mark.parametrize("size", [(480, 270), (640, 360)])
-def test_the_sizes_of_the_source_are_aligned_at_pixel_centres(size):
-    width, height = size
-    columns = np.broadcast_to(np.arange(width, dtype=np.uint16), (height, width)).copy()
-    wanted = np.floor((np.arange(320) + 0.5) * width / 320)
-    assert np.array_equal(resize_depth(columns, 320, 192)[0], wanted)
-
-
-def test_no_value_comes_out_that_did_not_go_in(depth_images):
-    assert set(np.unique(resize_depth(depth_images[0], 32, 32))) <= set(np.unique(depth_images[0]))
+def test_a_png_of_a_rare_form_is_still_decoded(depth_frames, depth_images):
+    """OpenCV decodes what the decoder of plain files leaves to it: here a chunk that it does not know."""
+    gamma = b"gAMA" + (45455).to_bytes(4, "big")
+    chunk = (4).to_bytes(4, "big") + gamma + zlib.crc32(gamma).to_bytes(4, "big")
+    rare = depth_frames[0][:33] + chunk + depth_frames[0][33:]
+    assert decode_png16(rare) is None
+    assert np.array_equal(decode_depth(rare, WHERE), depth_images[0])
