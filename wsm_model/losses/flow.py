@@ -1,0 +1,69 @@
+"""Flow matching of RGB latents (paper, equation 7 and appendix A.1).
+
+x_tau = (1 - tau) x + tau eps with tau in [0, 1] (1 is noise); the model predicts eps - x. One tau per chunk, drawn
+uniformly and shifted towards noise; the error is weighted by a bell over tau.
+"""
+
+import math
+from functools import cache
+
+import torch
+from torch import Tensor
+
+GRID_POINTS = 1000
+"""Timesteps of Wan2.2's schedule, over which the weight has mean 1."""
+
+
+def shifted_flow_time(uniform: Tensor, shift: float) -> Tensor:
+    """Flow time tau = gamma s / (1 + (gamma - 1) s) of s in [0, 1] (paper, appendix A.1)."""
+    return shift * uniform / (1 + (shift - 1) * uniform)
+
+
+def noised(clean: Tensor, noise: Tensor, flow_time: Tensor) -> Tensor:
+    """(1 - tau) x + tau eps; `flow_time` [...] has the leading dimensions of `clean`."""
+    tau = flow_time.reshape(*flow_time.shape, *[1] * (clean.dim() - flow_time.dim()))
+    return (1 - tau) * clean + tau * noise
+
+
+@cache
+def _bell_constants(shift: float) -> tuple[float, float]:
+    """Minimum of the bell over the shifted grid, and the factor that makes its mean 1 there; float64."""
+    grid = shifted_flow_time(torch.arange(1, GRID_POINTS + 1, dtype=torch.float64) / GRID_POINTS, shift)
+    bell = torch.exp(-2 * (grid - 0.5) ** 2)
+    lowest = float(bell.min())
+    return lowest, 1 / float((bell - lowest).mean())
+
+
+def flow_weight(flow_time: Tensor, shift: float) -> Tensor:
+    """exp(-2 (tau - 1/2)^2) minus its minimum, with mean 1 over the shifted grid of 1000 timesteps.
+
+    The paper says "a bell-shaped function of tau"; this one is the weight of Wan2.2's training schedule (paper silent).
+    With a shift of 5 it is about 2.08 at 1/2 and 0 at 1.
+    """
+    lowest, factor = _bell_constants(shift)
+    return (torch.exp(-2 * (flow_time - 0.5) ** 2) - lowest).clamp(min=0) * factor
+
+
+def flow_loss(velocity: Tensor, clean: Tensor, noise: Tensor, weight_BF: Tensor, counted_BF: Tensor) -> Tensor:
+    """Weighted squared error of the velocity eps - x.
+
+    The mean over the values of a frame, then over the frames that count (paper silent on the order).
+
+    Args:
+        velocity: predictions [B, F, C, h, w].
+        clean: x, the same shape.
+        noise: eps, the same shape.
+        weight_BF: weight of each frame.
+        counted_BF: bool; padding and anchors do not count.
+
+    Returns:
+        A scalar; 0 where no frame counts.
+    """
+    error = (velocity.float() - (noise - clean).float()).square().flatten(2).mean(-1)
+    return mean_where(error * weight_BF, counted_BF)
+
+
+def mean_where(values: Tensor, counted: Tensor) -> Tensor:
+    """Mean of the values that count, of the same shape; 0 where none does. What does not count may be anything."""
+    kept = torch.where(counted, values, torch.zeros((), device=values.device, dtype=values.dtype))
+    return kept.sum() / max(1, math.prod(counted.shape) if counted.all() else int(counted.sum()))
