@@ -12,7 +12,7 @@ from wsm_data.files.digest import digest_json, sha256_bytes
 from wsm_data.files.stores import open_store
 from wsm_data.files.typed_toml import INPUT
 from wsm_data.shards.findings import Finding
-from wsm_data.shards.names import MANIFEST_NAME
+from wsm_data.shards.names import INDEX_NAME, INVENTORY_NAME, MANIFEST_NAME, QUARANTINE_NAME
 from wsm_data.shards.release import read_manifest
 from wsm_data.shards.verify import verify_release
 
@@ -50,9 +50,14 @@ def _list_units(config: VerifyConfig) -> Sequence[Unit]:
     manifest = read_manifest(store)
     inputs = {"manifest": sha256_bytes(store.read(MANIFEST_NAME))}
     if "://" not in config.release:  # a local file that is touched is read again; a remote one is known by its size
-        files = sorted(Path(config.release).iterdir())
+        files = sorted(path for path in Path(config.release).iterdir() if _is_read(path.name))
         inputs["files"] = digest_json([[one.name, one.stat().st_size, one.stat().st_mtime_ns] for one in files])
     return [Unit(id=manifest.name, inputs=inputs)]
+
+
+def _is_read(name: str) -> bool:
+    """Whether a file of a release folder is looked at: scores and selections are about a release, not of it."""
+    return name.endswith(".tar") or name in (MANIFEST_NAME, INDEX_NAME, INVENTORY_NAME, QUARANTINE_NAME)
 
 
 def _process(batch: Sequence[Unit], config: VerifyConfig, context: StageContext) -> Iterator[Outcome]:

@@ -13,7 +13,10 @@ from wsm_data.curation.scores_table import PATH_POINTS, ScorerInfo
 from wsm_data.schema.arrays import Float64Array
 from wsm_data.schema.clip import Clip
 
-CLIP_SCORES: tuple[ScorerInfo, ...] = tuple(one.info for one in (*GEOMETRY_SCORERS, *IMAGE_SCORERS))
+CLIP_SCORES: tuple[ScorerInfo, ...] = (
+    *(one.info for one in GEOMETRY_SCORERS),
+    *(one.info for one in IMAGE_SCORERS),
+)
 """What every score of a clip says of itself, in the order of the columns."""
 
 
