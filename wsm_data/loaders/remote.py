@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from wsm_data.errors import ConfigError
 from wsm_data.files.fsspec_store import FsspecStore
 from wsm_data.files.retries import RequestConfig
+from wsm_data.loaders.announcements import Announcements
 from wsm_data.loaders.config import ReadConfig
 from wsm_data.loaders.shard_reader import Span, missing_shard, short_shard
 
@@ -60,19 +61,19 @@ def read_exactly(store: FsspecStore, span: Span) -> memoryview:
 
 @dataclass(eq=False)
 class _Fetch:
-    """One request in advance, for one span or several that touch.
+    """One request in advance, for one announced span or several that touch.
 
     Attributes:
         whole: what is asked for.
-        untaken: spans of it that were not read yet.
+        unread: spans of it that were not read yet.
         body: the answer, once the request has been handed to a thread.
-        served_bytes: bytes the reader had delivered at that time.
+        read_bytes: bytes that the reader had delivered at that time.
     """
 
     whole: Span
-    untaken: int
+    unread: set[Span]
     body: Future[memoryview] | None = None
-    served_bytes: int = 0
+    read_bytes: int = 0
 
 
 class RangeReader:
@@ -96,8 +97,8 @@ class RangeReader:
         self._lock = threading.Lock()
         self._queue: deque[_Fetch] = deque()
         self._begun: list[_Fetch] = []
-        self._announced: dict[Span, _Fetch] = {}
-        self._served_bytes = 0
+        self._announced: Announcements[_Fetch] = Announcements()
+        self._read_bytes = 0
 
     def read_into(self, shard: str, offset: int, buffers: Sequence[memoryview]) -> None:
         """Fill writable byte buffers, one after the other, with the shard's bytes from `offset` on.
@@ -106,26 +107,35 @@ class RangeReader:
             IntegrityError: the shard is missing, or ends before the last buffer is full; names the shard.
             StoreError: the store refuses, or failed in all attempts; names the object.
         """
-        span = Span(shard, offset, sum(len(buffer) for buffer in buffers))
-        fetch = self._claim(span)
-        if fetch is None or fetch.body is None:
-            scatter(read_exactly(self._store, span), buffers)
+        piece = Span(shard, offset, sum(len(buffer) for buffer in buffers))
+        with self._lock:
+            self._read_bytes += piece.size
+            span, fetch = self._announced.find(piece) or (piece, None)
+            body = fetch.body if fetch else None
+            if fetch and not body and piece.end == span.end:
+                self._strike(span, fetch)  # its turn has not come: this thread asks at once
+        if fetch is None or body is None:
+            scatter(read_exactly(self._store, piece), buffers)
             return
+        is_read = False
         try:
-            begin = span.offset - fetch.whole.offset
-            scatter(fetch.body.result()[begin : begin + span.size], buffers)
+            begin = piece.offset - fetch.whole.offset
+            scatter(body.result()[begin : begin + piece.size], buffers)
+            is_read = piece.end < span.end
         finally:
-            self._release(fetch)
+            if not is_read:  # to its end, or it cannot be read at all
+                with self._lock:
+                    self._strike(span, fetch)
 
     def expect(self, spans: Sequence[Span]) -> None:
         """Say what will be read next, in this order."""
         with self._lock:
-            new = [span for span in dict.fromkeys(spans) if span not in self._announced]
-            for group in _touching(new):
+            for group in _touching(self._announced.unknown(spans)):
                 whole = Span(group[0].shard, group[0].offset, group[-1].end - group[0].offset)
-                fetch = _Fetch(whole, untaken=len(group))
+                fetch = _Fetch(whole, unread=set(group))
                 self._queue.append(fetch)
-                self._announced.update(dict.fromkeys(group, fetch))
+                for span in group:
+                    self._announced.add(span, fetch)
             self._give_up_abandoned()
             self._begin()
 
@@ -141,40 +151,31 @@ class RangeReader:
         self._store.close()
         self._threads.shutdown()
 
-    def _claim(self, span: Span) -> _Fetch | None:
-        """The request that brings this span, where one was announced; a request that has not begun loses the span."""
-        with self._lock:
-            self._served_bytes += span.size
-            fetch = self._announced.pop(span, None)
-            if fetch is not None and fetch.body is None:
-                fetch.untaken -= 1
-                if not fetch.untaken:
-                    self._queue.remove(fetch)
-            return fetch
-
-    def _release(self, fetch: _Fetch) -> None:
-        with self._lock:
-            fetch.untaken -= 1
-            if not fetch.untaken and fetch in self._begun:  # it is not where it was given up meanwhile
-                self._begun.remove(fetch)
-            self._begin()
+    def _strike(self, span: Span, fetch: _Fetch) -> None:
+        """A span needs its request no longer."""
+        self._announced.remove(span)
+        fetch.unread.discard(span)
+        if not fetch.unread:
+            for requests in (self._queue, self._begun):
+                if fetch in requests:
+                    requests.remove(fetch)
+        self._begin()
 
     def _begin(self) -> None:
         """Hand requests to the threads while their answers have room."""
         held_bytes = sum(fetch.whole.size for fetch in self._begun)
         while self._queue and (not self._begun or held_bytes + self._queue[0].whole.size <= self._ahead_bytes):
             fetch = self._queue.popleft()
-            fetch.served_bytes = self._served_bytes
+            fetch.read_bytes = self._read_bytes
             fetch.body = self._threads.submit(read_exactly, self._store, fetch.whole)
             self._begun.append(fetch)
             held_bytes += fetch.whole.size
 
     def _give_up_abandoned(self) -> None:
-        oldest_bytes = self._served_bytes - 2 * self._ahead_bytes
-        abandoned = {fetch for fetch in self._begun if fetch.served_bytes < oldest_bytes}
-        if abandoned:
-            self._begun = [fetch for fetch in self._begun if fetch not in abandoned]
-            self._announced = {span: fetch for span, fetch in self._announced.items() if fetch not in abandoned}
+        oldest = self._read_bytes - 2 * self._ahead_bytes
+        for fetch in [fetch for fetch in self._begun if fetch.read_bytes < oldest]:
+            for span in tuple(fetch.unread):
+                self._strike(span, fetch)
 
 
 def _touching(spans: Sequence[Span]) -> Iterator[list[Span]]:
