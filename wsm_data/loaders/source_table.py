@@ -21,7 +21,6 @@ from wsm_data.loaders.config import SourceConfig
 from wsm_data.loaders.order import SourceLayout
 from wsm_data.loaders.stable_hash import Int64Array
 from wsm_data.shards.index_row import IndexRow
-from wsm_data.shards.manifest import release_digest
 from wsm_data.shards.release import Release, open_release
 from wsm_data.shards.selection import read_selection
 
@@ -35,7 +34,6 @@ class SourceTable:
     Attributes:
         config: what was asked for.
         release: the release; its index is read column by column.
-        digest: digest of the release.
         selection: name of the selection, empty for none.
         rows: rows of the index that the source has, ascending; int64 [clips].
         base: ref of its first clip.
@@ -43,7 +41,6 @@ class SourceTable:
 
     config: SourceConfig
     release: Release
-    digest: str
     selection: str
     rows: Int64Array
     base: int
@@ -177,16 +174,15 @@ def open_sources(configs: Sequence[SourceConfig]) -> Sources:
 
 
 def _open_source(config: SourceConfig, release: Release, base: int) -> SourceTable:
-    digest = release_digest(release.manifest)
     rows, selection = np.arange(len(release.index)), ""
     if config.selection:
-        chosen = read_selection(release.store, config.selection, digest)
+        chosen = read_selection(release.store, config.selection, release.digest)
         rows, selection = chosen.rows_of(release.index), chosen.name
     if config.split:
         rows = rows[_is_of_split(config, release)[rows]]
     if not len(rows):
         raise ConfigError(f"{release.store.root}: selection {config.selection} has no clip of split {config.split}")
-    return SourceTable(config=config, release=release, digest=digest, selection=selection, rows=rows, base=base)
+    return SourceTable(config=config, release=release, selection=selection, rows=rows, base=base)
 
 
 def _is_of_split(config: SourceConfig, release: Release) -> np.ndarray:
@@ -227,7 +223,7 @@ def count_duplicates(tables: Sequence[SourceTable]) -> int:
 
 
 def _shared_keys(one: SourceTable, other: SourceTable) -> list[str]:
-    if one.digest == other.digest:
+    if one.release.digest == other.release.digest:
         rows = np.intersect1d(one.rows, other.rows, assume_unique=True)
         return one.release.index.keys_at(rows)
     own, others = (_content(table) for table in (one, other))
@@ -248,7 +244,7 @@ def _words(table: SourceTable) -> str:
 def _identity(table: SourceTable) -> dict[str, Any]:
     return {
         "release": table.release.manifest.name,
-        "release_digest": table.digest,
+        "release_digest": table.release.digest,
         "split": table.config.split,
         "selection": table.selection,
         "clips": len(table),

@@ -1,12 +1,10 @@
 """index.parquet on a disk or in memory, of which only the columns and rows are read that somebody asks for."""
 
-import hashlib
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import lru_cache
 from itertools import accumulate
-from pathlib import Path
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -79,21 +77,3 @@ class IndexFile:
             raise IntegrityError(
                 f"{self._where} must be the index of a release, but: {error}; restore the file"
             ) from error
-
-
-def open_local_index(path: Path, sha256: str) -> IndexFile:
-    """Open an index on this machine, without holding it in memory, once its digest was compared.
-
-    What was hashed and what is read later is one open file, whatever happens to the path.
-
-    Raises:
-        IntegrityError: the file is missing, was changed, or is no index of this version.
-    """
-    try:
-        file = pa.OSFile(str(path))
-    except FileNotFoundError as error:
-        raise IntegrityError(f"{path} is missing; fetch it again") from error
-    found = hashlib.file_digest(file, "sha256").hexdigest()
-    if found != sha256:
-        raise IntegrityError(f"{path} must have sha256 {sha256}, found {found}; fetch it again")
-    return IndexFile(file, str(path))

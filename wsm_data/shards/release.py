@@ -1,6 +1,8 @@
 """A finished release, opened for reading: by path, or by the URL of any store that fsspec knows."""
 
+import hashlib
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -14,7 +16,7 @@ from wsm_data.schema.clip import Clip
 from wsm_data.schema.codec import CodecInfo
 from wsm_data.shards.clip_bytes import check_members, decode_clip
 from wsm_data.shards.index import IndexTable
-from wsm_data.shards.index_file import IndexFile, open_local_index
+from wsm_data.shards.index_file import IndexFile
 from wsm_data.shards.index_row import IndexRow
 from wsm_data.shards.inventory import InventoryRow, parse_inventory, parse_quarantine
 from wsm_data.shards.manifest import ReleaseManifest, parse_manifest
@@ -32,11 +34,13 @@ class Release:
         store: where the files are.
         manifest: dataset.json.
         index: index.parquet.
+        digest: digest of the release, by which selections and loader states name it.
     """
 
     store: Store
     manifest: ReleaseManifest
     index: IndexTable
+    digest: str
 
     def read_clip(self, key: str, verify: bool = True) -> Clip:
         """Read one clip with a single ranged read; its arrays are read-only views of the bytes that were read.
@@ -135,20 +139,18 @@ def open_release(location: str | Path) -> Release:
             one the manifest vouches for.
     """
     store = open_store(location)
-    manifest = read_manifest(store)
-    index = IndexTable(_open_index(store, manifest.index_sha256))
+    data = _manifest_data(store)
+    with ThreadPoolExecutor(1) as pool:  # the index of ten million clips takes seconds to hash, its manifest one more
+        loading = pool.submit(_load_index, store)
+        manifest = _parse_manifest(store, data)
+        content, found = loading.result()
+    _require_digest(store, INDEX_NAME, manifest.index_sha256, found)
+    index = IndexTable(IndexFile(content, f"{store.root}/{INDEX_NAME}"))
     if len(index) != manifest.clips:
         raise IntegrityError(
             f"{store.root}: the manifest counts {manifest.clips} clips, the index has {len(index)} rows"
         )
-    return Release(store, manifest, index)
-
-
-def _open_index(store: Store, sha256: str) -> IndexFile:
-    """A local index stays on its disk; one behind a URL is fetched once."""
-    if isinstance(store, LocalStore):
-        return open_local_index(Path(store.root) / INDEX_NAME, sha256)
-    return IndexFile(pa.BufferReader(checked_file(store, INDEX_NAME, sha256)), f"{store.root}/{INDEX_NAME}")
+    return Release(store, manifest, index, sha256_bytes(data))
 
 
 def read_manifest(store: Store) -> ReleaseManifest:
@@ -158,6 +160,10 @@ def read_manifest(store: Store) -> ReleaseManifest:
         ConfigError: there is no such folder, or the release lies in a folder below it.
         IntegrityError: the release is unfinished, or its manifest is not one of this schema version.
     """
+    return _parse_manifest(store, _manifest_data(store))
+
+
+def _manifest_data(store: Store) -> bytes:
     if not store.exists(MANIFEST_NAME):
         try:
             store.names()
@@ -167,10 +173,29 @@ def read_manifest(store: Store) -> ReleaseManifest:
             ) from error
         _refuse_outer_folder(store)
         raise IntegrityError(f"{store.root} has no {MANIFEST_NAME}, so the release is unfinished; run `wsm pack` again")
+    return store.read(MANIFEST_NAME)
+
+
+def _parse_manifest(store: Store, data: bytes) -> ReleaseManifest:
     try:
-        return parse_manifest(store.read(MANIFEST_NAME), f"{store.root}/{MANIFEST_NAME}")
+        return parse_manifest(data, f"{store.root}/{MANIFEST_NAME}")
     except IntegrityError as error:
         raise IntegrityError(f"{error}. Fetch the release again, or write it again with `wsm pack`") from error
+
+
+def _load_index(store: Store) -> tuple[pa.NativeFile, str]:
+    """The index at random access, and its sha256. A local one stays on its disk, one behind a URL is fetched once.
+
+    What was hashed and what is read later is one open file, whatever happens to its name.
+    """
+    if not isinstance(store, LocalStore):
+        data = _read_whole(store, INDEX_NAME)
+        return pa.BufferReader(data), sha256_bytes(data)
+    try:
+        file = pa.OSFile(f"{store.root}/{INDEX_NAME}")
+    except FileNotFoundError as error:
+        raise _missing(store, INDEX_NAME) from error
+    return file, hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _refuse_outer_folder(store: Store) -> None:
@@ -186,11 +211,22 @@ def checked_file(store: Store, name: str, sha256: str) -> bytes:
     Raises:
         IntegrityError: it is missing or was changed.
     """
-    try:
-        data = store.read(name)
-    except FileNotFoundError as error:
-        raise IntegrityError(f"{store.root}/{name} is missing; fetch it again") from error
-    found = sha256_bytes(data)
-    if found != sha256:
-        raise IntegrityError(f"{store.root}/{name} must have sha256 {sha256}, found {found}; fetch it again")
+    data = _read_whole(store, name)
+    _require_digest(store, name, sha256, sha256_bytes(data))
     return data
+
+
+def _read_whole(store: Store, name: str) -> bytes:
+    try:
+        return store.read(name)
+    except FileNotFoundError as error:
+        raise _missing(store, name) from error
+
+
+def _missing(store: Store, name: str) -> IntegrityError:
+    return IntegrityError(f"{store.root}/{name} is missing; fetch it again")
+
+
+def _require_digest(store: Store, name: str, wanted: str, found: str) -> None:
+    if found != wanted:
+        raise IntegrityError(f"{store.root}/{name} must have sha256 {wanted}, found {found}; fetch it again")

@@ -1,4 +1,3 @@
-import hashlib
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -9,7 +8,7 @@ import pytest
 
 from wsm_data.errors import IntegrityError
 from wsm_data.shards.index import IndexTable, write_index
-from wsm_data.shards.index_file import IndexFile, open_local_index
+from wsm_data.shards.index_file import IndexFile
 from wsm_data.shards.index_row import SCHEMA
 from wsm_data.shards.names import INDEX_NAME
 
@@ -24,7 +23,7 @@ def path(tiny: SimpleNamespace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
 
 
 def open_it(path: Path) -> IndexFile:
-    return open_local_index(path, hashlib.sha256(path.read_bytes()).hexdigest())
+    return IndexFile(pa.OSFile(str(path)), str(path))
 
 
 def damage(path: Path, column: str, group: int) -> None:
@@ -60,26 +59,6 @@ def test_columns_and_groups_are_read_alone(path: Path) -> None:
         index.numbers("poses_checksum")
     with pytest.raises(IntegrityError, match=r"small_groups\.parquet must be the index of a release"):
         index.row_at(2)
-
-
-def test_a_file_replaced_later_is_not_believed(path: Path, tmp_path: Path) -> None:
-    index = IndexTable(open_it(path))
-    keys = index.texts("key")
-    other = tmp_path / "other"
-    write_index(other, SCHEMA.empty_table())
-    other.replace(path)
-    assert index.texts("key") == keys
-
-
-def test_a_file_with_another_digest_is_refused_before_it_is_parsed(path: Path) -> None:
-    with pytest.raises(IntegrityError, match=r"small_groups\.parquet must have sha256 abc, found"):
-        open_local_index(path, "abc")
-    path.write_bytes(b"nothing")
-    with pytest.raises(IntegrityError, match=r"must have sha256 abc, found"):
-        open_local_index(path, "abc")
-    path.unlink()
-    with pytest.raises(IntegrityError, match="is missing; fetch it again"):
-        open_local_index(path, "abc")
 
 
 def test_bytes_in_memory_are_read_like_a_file(path: Path) -> None:

@@ -12,8 +12,10 @@ import pytest
 from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.files.stores import LocalStore
 from wsm_data.schema.clip import MEMBERS, Clip
-from wsm_data.shards.manifest import manifest_bytes
-from wsm_data.shards.release import Release, open_release
+from wsm_data.shards.index import write_index
+from wsm_data.shards.index_row import SCHEMA
+from wsm_data.shards.manifest import manifest_bytes, release_digest
+from wsm_data.shards.release import open_release
 from wsm_data.shards.verify import verify_release
 
 
@@ -108,6 +110,17 @@ def test_an_index_that_was_changed_or_removed_is_refused(tiny: SimpleNamespace) 
         open_release(tiny.folder)
 
 
+def test_what_is_read_is_the_file_that_was_hashed(tiny: SimpleNamespace, tmp_path: Path) -> None:
+    release = open_release(tiny.folder)
+    write_index(tmp_path / "other", SCHEMA.empty_table())
+    (tmp_path / "other").replace(tiny.folder / "index.parquet")
+    assert sorted(release.index.texts("key")) == sorted(clip.meta.key for clip in tiny.clips)
+
+
+def test_a_release_knows_its_digest(tiny: SimpleNamespace) -> None:
+    assert open_release(tiny.folder).digest == release_digest(tiny.manifest)
+
+
 def test_an_index_of_another_length_than_counted_is_refused(tiny: SimpleNamespace) -> None:
     (tiny.folder / "dataset.json").write_bytes(manifest_bytes(replace(tiny.manifest, clips=8)))
     with pytest.raises(IntegrityError, match="counts 8 clips, the index has 7 rows"):
@@ -198,7 +211,7 @@ def test_a_clip_of_another_codec_than_the_release_is_refused(tiny: SimpleNamespa
     release = open_release(tiny.folder)
     manifest = replace(release.manifest, codec=replace(tiny.codec, digest="other"))
     with pytest.raises(IntegrityError, match="codec digest other, found"):
-        Release(release.store, manifest, release.index).read_clip(tiny.clips[0].meta.key)
+        replace(release, manifest=manifest).read_clip(tiny.clips[0].meta.key)
 
 
 def test_a_clip_that_is_not_there_is_a_wrong_request(tiny: SimpleNamespace, make_clip: Callable[..., Clip]) -> None:
