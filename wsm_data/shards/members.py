@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import prod
 from types import MappingProxyType
 
 import numpy as np
@@ -83,8 +84,15 @@ def lay_out(key: str, *, axes: Mapping[str, int], meta_size: int, checksums: Map
 
 def header_bytes(key: str, member: Member) -> bytes:
     """The bytes from `header_offset` to `array_offset`: tar header, and npy header of an array."""
-    header = member_header(f"{key}.{member.file_name}", member.data_size)
-    return header if member.name == META else header + npy_header(STORED_DTYPES[member.name], member.shape)
+    if member.name == META:
+        return member_header(f"{key}.{member.file_name}", member.data_size)
+    return array_header(key, member.name, member.shape)
+
+
+def array_header(key: str, name: str, shape: tuple[int, ...]) -> bytes:
+    """Tar header and npy header of an array member."""
+    size = prod(shape) * STORED_DTYPES[name].itemsize
+    return member_header(f"{key}.{name}.npy", NPY_HEADER_BYTES + size) + npy_header(STORED_DTYPES[name], shape)
 
 
 def _place(key: str, name: str, *, axes: Mapping[str, int], meta_size: int, checksum: str, offset: int) -> Member:

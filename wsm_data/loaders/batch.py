@@ -1,0 +1,179 @@
+"""A batch: what it is for the model, and how it lies in one block of memory.
+
+All tensors of a batch are views of one block, so that it crosses to a device or to another process as a whole, and its
+memory is used again as a whole.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from math import prod
+
+import torch
+
+from wsm_data.loaders.timing import Part
+from wsm_data.schema.clip import TEMPORAL_RATIO
+
+POSE_SLOTS = TEMPORAL_RATIO
+"""Pose slots of a latent: latent j >= 1 has those of its raw frames 4 j - 3 to 4 j, latent 0 the first pose in each."""
+
+LATENT_TENSORS = ("rgb", "depth")
+"""Tensors of a batch that hold latents."""
+
+NO_SEQUENCE = -1
+"""`sequence_id` of padding."""
+
+_ALIGNMENT_BYTES = 64
+
+LATENT_DTYPES: Mapping[str, torch.dtype] = {
+    "float32": torch.float32,
+    "bfloat16": torch.bfloat16,
+    "float16": torch.float16,
+}
+"""Dtypes that the latents of a batch can have."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Batch:
+    """What one rank has of one global step: R rows of L latents, in which N sequences lie.
+
+    Padding is zero, and `sequence_id` is -1 there.
+
+    Attributes:
+        rgb: colour latents; [R, L, C, h, w].
+        depth: depth latents; [R, L, C, h, w].
+        depth_valid: share of pixels with a depth measurement, 0 to 255; uint8 [R, L, h, w].
+        poses: camera in the first camera's frame, x, y, z (m) and quaternion w, x, y, z; float32 [R, L, 4, 7]. Slot
+            m = 0..3 of latent j >= 1 is raw frame 4 (j - 1) + m + 1; latent 0 has the identity four times.
+        still: pose slots of still frames that were added at the end of a clip; bool [R, L, 4].
+        sequence_id: number of the sequence in the batch, -1 where there is none; int32 [R, L].
+        latent_index: number of the latent in its sequence; int32 [R, L].
+        row: row of each sequence; int64 [N].
+        start: its first latent in the row; int64 [N].
+        lengths: its latents; int64 [N].
+        chunk_size: its chunk size K; int64 [N].
+        goal_camera0_m: last camera position of the whole clip in the first camera's frame, m; float32 [N, 3].
+        refs: numbers of the clips over all sources; int64 [N].
+        keys: keys of the clips.
+        epoch: number of the epoch.
+        step: number of the global step in the epoch.
+    """
+
+    rgb: torch.Tensor
+    depth: torch.Tensor
+    depth_valid: torch.Tensor
+    poses: torch.Tensor
+    still: torch.Tensor
+    sequence_id: torch.Tensor
+    latent_index: torch.Tensor
+    row: torch.Tensor
+    start: torch.Tensor
+    lengths: torch.Tensor
+    chunk_size: torch.Tensor
+    goal_camera0_m: torch.Tensor
+    refs: torch.Tensor
+    keys: tuple[str, ...]
+    epoch: int
+    step: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class BatchLayout:
+    """Sizes that decide where each tensor of a batch lies.
+
+    Attributes:
+        rows: R.
+        row_latents: L.
+        sequences: N.
+        latent_shape: channels, height and width of a latent.
+        dtype: dtype of the latents.
+    """
+
+    rows: int
+    row_latents: int
+    sequences: int
+    latent_shape: tuple[int, int, int]
+    dtype: torch.dtype
+
+    @cached_property
+    def tensors(self) -> dict[str, "TensorPlace"]:
+        """Place of each tensor of `Batch`, by name."""
+        rows, row_latents, (_, height, width) = self.rows, self.row_latents, self.latent_shape
+        shapes: dict[str, tuple[torch.dtype, tuple[int, ...]]] = {
+            "rgb": (self.dtype, (rows, row_latents, *self.latent_shape)),
+            "depth": (self.dtype, (rows, row_latents, *self.latent_shape)),
+            "depth_valid": (torch.uint8, (rows, row_latents, height, width)),
+            "poses": (torch.float32, (rows, row_latents, POSE_SLOTS, 7)),
+            "still": (torch.bool, (rows, row_latents, POSE_SLOTS)),
+            "sequence_id": (torch.int32, (rows, row_latents)),
+            "latent_index": (torch.int32, (rows, row_latents)),
+            **dict.fromkeys(("row", "start", "lengths", "chunk_size", "refs"), (torch.int64, (self.sequences,))),
+            "goal_camera0_m": (torch.float32, (self.sequences, 3)),
+        }
+        places: dict[str, TensorPlace] = {}
+        offset = 0
+        for name, (dtype, shape) in shapes.items():
+            places[name] = TensorPlace(offset=offset, dtype=dtype, shape=shape)
+            offset = -(-places[name].end // _ALIGNMENT_BYTES) * _ALIGNMENT_BYTES
+        return places
+
+    @property
+    def size_bytes(self) -> int:
+        """Bytes of the block that holds all tensors."""
+        return max(place.end for place in self.tensors.values())
+
+
+@dataclass(frozen=True, kw_only=True)
+class TensorPlace:
+    """Where a tensor lies in the block.
+
+    Attributes:
+        offset: first byte.
+        dtype: its dtype.
+        shape: its shape.
+    """
+
+    offset: int
+    dtype: torch.dtype
+    shape: tuple[int, ...]
+
+    @property
+    def item_bytes(self) -> int:
+        """Bytes of what lies behind the first axis: of one row, or of one sequence."""
+        return prod(self.shape[1:]) * self.dtype.itemsize
+
+    @property
+    def end(self) -> int:
+        """First byte behind the tensor."""
+        return self.offset + prod(self.shape) * self.dtype.itemsize
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PackedBatch:
+    """A batch as one block of memory.
+
+    Attributes:
+        block: the memory; uint8 [layout.size_bytes], on any device.
+        layout: where each tensor lies in it.
+        keys: keys of the clips.
+        epoch: number of the epoch.
+        step: number of the global step in the epoch.
+        seconds: time that each part of reading it took, s.
+    """
+
+    block: torch.Tensor
+    layout: BatchLayout
+    keys: tuple[str, ...]
+    epoch: int
+    step: int
+    seconds: Mapping[Part, float] = field(default_factory=dict)
+
+    def tensor(self, name: str) -> torch.Tensor:
+        """A tensor of the batch, as a view of the block."""
+        place = self.layout.tensors[name]
+        return self.block[place.offset : place.end].view(place.dtype).view(place.shape)
+
+    def unpacked(self) -> Batch:
+        """The batch itself; all tensors are views of the block."""
+        tensors = {name: self.tensor(name) for name in self.layout.tensors}
+        return Batch(**tensors, keys=self.keys, epoch=self.epoch, step=self.step)

@@ -1,0 +1,225 @@
+"""The loader: batches of one rank in the order of the plan, from where the state says, and a state to go on from."""
+
+import os
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from types import TracebackType
+from typing import Any
+
+import torch.distributed
+import torch.utils.data
+
+from wsm_data.errors import ConfigError
+from wsm_data.loaders.batch import Batch
+from wsm_data.loaders.config import LoaderConfig
+from wsm_data.loaders.ledger import LedgerWriter
+from wsm_data.loaders.plan import EpochPlan, PlanReport, plan_epoch, rows_per_rank
+from wsm_data.loaders.source_table import Sources, open_sources
+from wsm_data.loaders.state import loader_state, restore, state_to_json
+from wsm_data.loaders.step_reader import StepReader
+from wsm_data.loaders.stream import BatchStream, open_stream
+from wsm_data.loaders.timing import Part, Timing
+from wsm_data.loaders.transfer import hand_over, open_transfer
+
+
+class ClipLoader(torch.utils.data.IterableDataset[Batch]):
+    """Batches of one rank. Iterating gives the rest of the current epoch, then the loader stands at the next one.
+
+    An iterator starts when it is first advanced, so that one nobody advances changes nothing. There is one place, that
+    of `state_dict`: when another iterator is started, or the place is changed, an older iterator raises RuntimeError.
+    Within a worker of a torch DataLoader (`batch_size=None`), worker w of n gives the steps w, w + n, ...
+    """
+
+    def __init__(self, config: LoaderConfig, *, rank: int | None = None, world_size: int | None = None):
+        """Open the sources; no clip is read yet.
+
+        Args:
+            config: what is read, in which order, and how.
+            rank: number of this rank; None: that of torch.distributed, 0 where it is not initialised.
+            world_size: number of ranks; None: that of torch.distributed, 1 where it is not initialised.
+
+        Raises:
+            ConfigError: the settings contradict themselves, the sources, or this machine.
+            IntegrityError: a release is unfinished or damaged.
+            ValueError: there is no such rank.
+        """
+        self._config = config
+        self._rank, self._world_size = _place_among_ranks(rank, world_size)
+        rows_per_rank(config.order, self._world_size)
+        self._sources = open_sources(config.sources)
+        manifest = self._sources.tables[0].release.manifest
+        self._transfer = open_transfer(config.read, manifest)
+        self._reader = self._open_reader()
+        self._process = os.getpid()
+        self._template = loader_state(self._sources, config.order, epoch=0, step=0)
+        self._ledger = self._open_ledger()
+        self._plan: EpochPlan | None = None
+        self._epoch, self._step = 0, 0
+        self._turn = 0
+        self._running: BatchStream | None = None
+        self.timing = Timing()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Cross to another process as settings and a place; what is open stays here."""
+        return _reopened, (self._config, self._rank, self._world_size, self.state_dict())
+
+    @property
+    def sources(self) -> Sources:
+        """The clips, by their refs."""
+        return self._sources
+
+    @property
+    def plan(self) -> EpochPlan:
+        """The plan of the current epoch.
+
+        Raises:
+            ConfigError: the epoch has no step, or a clip does not fit into a packed row.
+        """
+        if self._plan is None or self._plan.epoch != self._epoch:
+            self._plan = plan_epoch(self._sources.layouts, self._config.order, self._epoch)
+        return self._plan
+
+    @property
+    def steps(self) -> int:
+        """Global steps of the current epoch, the same on every rank."""
+        return self.plan.steps
+
+    @property
+    def report(self) -> PlanReport:
+        """What becomes of the clips in the current epoch."""
+        return self.plan.report
+
+    def state_dict(self) -> dict[str, Any]:
+        """The place behind the last batch that was delivered, as JSON; what was read ahead does not count."""
+        return state_to_json(replace(self._template, epoch=self._epoch, step=self._step))
+
+    def load_state_dict(self, state_dict: Mapping[str, Any]) -> None:
+        """Go on from a place, on as many ranks, threads or workers as there are now.
+
+        Raises:
+            ConfigError: the state is of other sources or another order; the message says field by field.
+        """
+        epoch, step = restore(state_dict, self._template)
+        self._move_to(epoch, step)
+        if step > self.steps:
+            raise ConfigError(f"epoch {epoch} has {self.steps} steps, but the state stands at step {step}; restore it")
+
+    def set_epoch(self, epoch: int) -> None:
+        """Go to the start of an epoch; nothing where the loader is in it already.
+
+        Raises:
+            ValueError: the number is negative.
+        """
+        if epoch < 0:
+            raise ValueError(f"epoch must be at least 0, found {epoch}")
+        if epoch != self._epoch:
+            self._move_to(epoch, 0)
+
+    def __iter__(self) -> Iterator[Batch]:
+        self._turn += 1
+        turn, stream = self._turn, self._start()
+        try:
+            while (batch := self._deliver(turn, stream)) is not None:
+                yield batch
+                del batch  # its memory is free as soon as the caller lets go of it
+        finally:
+            stream.close()
+        self._epoch, self._step = self._epoch + 1, 0
+
+    def close(self) -> None:
+        """End all threads and processes, close the files and the ledger. A later iterator opens them again."""
+        self._turn += 1
+        self._stop()
+        self._reader.close()
+        if self._ledger is not None:
+            self._ledger.close()
+
+    def __enter__(self) -> "ClipLoader":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _start(self) -> BatchStream:
+        """Begin to deliver from the current place; an older iterator stops reading."""
+        self._stop()
+        if self._process != os.getpid():  # a fork takes neither threads nor connections along
+            self._reader, self._process = self._open_reader(), os.getpid()
+        worker = torch.utils.data.get_worker_info()
+        first, stride = (0, 1) if worker is None else (worker.id, worker.num_workers)
+        if worker is not None:
+            _require_fit_for_worker(self._config)
+        steps = range(self._step + (first - self._step) % stride, self.steps, stride)
+        if self._ledger is not None:
+            self._ledger.begin(self._epoch, self._step, self.steps)
+        self._running = open_stream(
+            self._reader, self._transfer, self.plan, steps, self._config.read, self.timing, inline=worker is not None
+        )
+        return self._running
+
+    def _deliver(self, turn: int, stream: BatchStream) -> Batch | None:
+        """The next batch, counted and recorded; None where the epoch is over."""
+        if turn != self._turn:
+            raise RuntimeError(
+                "this iterator was overtaken: another one was started since, or the loader was moved or closed; a "
+                "loader has one place, so advance the newest iterator only"
+            )
+        start = time.perf_counter()
+        batch = next(stream, None)
+        self.timing.add({Part.WAIT: time.perf_counter() - start})
+        if batch is None:
+            return None
+        if self._ledger is not None:
+            self._ledger.record(batch.epoch, batch.step, batch.refs.cpu().numpy())
+        self._step = batch.step + 1
+        return hand_over(batch)
+
+    def _move_to(self, epoch: int, step: int) -> None:
+        self._turn += 1
+        self._stop()
+        self._epoch, self._step = epoch, step
+
+    def _stop(self) -> None:
+        if self._running is not None:
+            self._running.close()
+            self._running = None
+
+    def _open_reader(self) -> StepReader:
+        return StepReader(self._sources, self._config.read, rank=self._rank, world_size=self._world_size)
+
+    def _open_ledger(self) -> LedgerWriter | None:
+        identity = {"sources": self._template.sources, "order": self._template.order}
+        folder = self._config.ledger
+        return LedgerWriter(folder, identity, self._rank, self._world_size) if folder else None
+
+
+def _place_among_ranks(rank: int | None, world_size: int | None) -> tuple[int, int]:
+    if (rank is None) != (world_size is None):
+        raise ValueError(f"rank and world_size belong together, found rank = {rank}, world_size = {world_size}")
+    if rank is None or world_size is None:
+        together = torch.distributed.is_available() and torch.distributed.is_initialized()
+        rank = torch.distributed.get_rank() if together else 0
+        world_size = torch.distributed.get_world_size() if together else 1
+    if not 0 <= rank < world_size:
+        raise ValueError(f"rank must lie in [0, world_size = {world_size}), found {rank}")
+    return rank, world_size
+
+
+def _require_fit_for_worker(config: LoaderConfig) -> None:
+    """What only the training process can do must not be asked of a worker of somebody else's DataLoader."""
+    asked = {"ledger": config.ledger, "workers": config.read.workers, "pin_memory": config.read.pin_memory}
+    if any(asked.values()) or config.read.device != "cpu":
+        names = [name for name, value in asked.items() if value] + ["device"] * (config.read.device != "cpu")
+        raise ConfigError(
+            f"a loader inside a DataLoader worker must leave these settings out, found {', '.join(names)}; iterate the "
+            "loader itself, which reads ahead with threads, or leave them out"
+        )
+
+
+def _reopened(config: LoaderConfig, rank: int, world_size: int, state: Mapping[str, Any]) -> ClipLoader:
+    loader = ClipLoader(config, rank=rank, world_size=world_size)
+    loader.load_state_dict(state)
+    return loader

@@ -1,0 +1,22 @@
+"""Which reader the shards of a release need."""
+
+from wsm_data.files.stores import LocalStore
+from wsm_data.loaders.cached_shards import CachedShards
+from wsm_data.loaders.config import ReadConfig, RemoteAccess
+from wsm_data.loaders.local_shards import LocalShards
+from wsm_data.loaders.remote import RangeReader
+from wsm_data.loaders.shard_reader import ShardReader
+from wsm_data.shards.release import Release
+
+
+def open_shards(release: Release, read: ReadConfig) -> ShardReader:
+    """A reader of the shards of a release, by where they are.
+
+    Raises:
+        ConfigError: the settings do not fit a release behind a URL, such as a cache that could not hold a shard.
+    """
+    if isinstance(release.store, LocalStore):
+        return LocalShards(release.store.root)
+    if read.access is RemoteAccess.SHARDS:
+        return CachedShards(release.store.root, release.manifest, read)
+    return RangeReader(release.store.root, read)

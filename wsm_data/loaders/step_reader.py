@@ -1,0 +1,147 @@
+"""One step of one rank: its clips read into one block of memory, checked, standardised, and described."""
+
+import threading
+from collections.abc import Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+import torch
+
+from wsm_data.errors import ConfigError
+from wsm_data.loaders.arrangement import ArrangedClip, arrange, batch_layout, describe, slots_of
+from wsm_data.loaders.batch import LATENT_DTYPES, LATENT_TENSORS, PackedBatch
+from wsm_data.loaders.buffers import BufferPool
+from wsm_data.loaders.clip_reads import clip_places, read_clip, span_of
+from wsm_data.loaders.config import ReadConfig
+from wsm_data.loaders.open_shards import open_shards
+from wsm_data.loaders.plan import EpochPlan, chunk_sizes
+from wsm_data.loaders.shard_reader import ShardReader
+from wsm_data.loaders.source_table import Sources
+from wsm_data.loaders.standardise import convert, standardisations
+from wsm_data.loaders.timing import Part, Stopwatch
+from wsm_data.loaders.transfer import device_of
+from wsm_data.loaders.verification import Verification
+
+_STORED = torch.float16
+
+
+class StepReader:
+    """Reads steps of one rank. Safe to be used by several threads; what it delivers does not depend on them."""
+
+    def __init__(self, sources: Sources, read: ReadConfig, *, rank: int, world_size: int):
+        """Open the shards.
+
+        Latents are standardised here for the processor; for another device they stay as they are stored.
+
+        Args:
+            sources: the clips.
+            read: the settings.
+            rank: number of this rank.
+            world_size: number of ranks.
+
+        Raises:
+            ConfigError: a dtype that latents cannot have, no statistics to standardise by, a place without a reader.
+        """
+        if read.dtype not in LATENT_DTYPES:
+            raise ConfigError(f"dtype must be one of {', '.join(LATENT_DTYPES)}, found {read.dtype!r}")
+        manifest = sources.tables[0].release.manifest
+        codec = manifest.codec
+        cells = (manifest.encoded_height_px // codec.spatial_ratio, manifest.encoded_width_px // codec.spatial_ratio)
+        as_stored = device_of(read).type != "cpu"
+        self._sources, self._read, self._rank, self._world_size = sources, read, rank, world_size
+        self._latent_shape = (codec.channels, *cells)
+        self._dtype = _STORED if as_stored else LATENT_DTYPES[read.dtype]
+        self._standardise = standardisations(manifest) if read.standardise and not as_stored else {}
+        self._verification = Verification(read.verify, [len(table) for table in sources.tables])
+        self._pool = BufferPool(keep=read.prefetch_batches + 2, pinned=read.pin_memory)
+        self._staging = threading.local()
+        self._readers = _open_readers(sources, read)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Cross to another process as settings; what is open stays here."""
+        return partial(StepReader, rank=self._rank, world_size=self._world_size), (self._sources, self._read)
+
+    def reopened(self) -> "StepReader":
+        """One like this, with files, threads and connections of its own."""
+        return StepReader(self._sources, self._read, rank=self._rank, world_size=self._world_size)
+
+    def announce(self, plan: EpochPlan, step: int) -> None:
+        """Tell the readers what a step will need, before it is read."""
+        rows = plan.rows(step, self._rank, self._world_size)
+        places = clip_places(self._sources, np.concatenate(rows))
+        for reader in dict.fromkeys(self._readers):
+            reader.expect([span_of(place) for place in places if self._readers[place.source] is reader])
+
+    def read(self, plan: EpochPlan, step: int) -> PackedBatch:
+        """Read what this rank has of a step.
+
+        Raises:
+            IntegrityError: the bytes of a clip are not those that the release vouches for; names shard and clip.
+            StoreError: a store failed for good.
+            OSError: the system refuses to read.
+        """
+        watch = Stopwatch()
+        with watch.measure(Part.COLLATE):
+            rows = plan.rows(step, self._rank, self._world_size)
+            refs = np.concatenate(rows)
+            clips = arrange(rows, clip_places(self._sources, refs), plan)
+            layout = batch_layout(clips, len(rows), plan, self._latent_shape, self._dtype)
+            packed = PackedBatch(
+                block=self._pool.take(layout.size_bytes),
+                layout=layout,
+                keys=tuple(clip.place.key for clip in clips),
+                epoch=plan.epoch,
+                step=step,
+                seconds=watch.seconds,
+            )
+        memory = memoryview(packed.block.numpy())
+        goals = np.empty((len(clips), 3), np.float32)
+        for number, clip in enumerate(clips):
+            goals[number] = self._read_clip(packed, memory, clip, watch)[:3]
+        with watch.measure(Part.COLLATE):
+            packed.tensor("refs").numpy()[:] = refs
+            describe(packed, clips, chunk_sizes(refs, plan.order, plan.epoch), goals)
+        return packed
+
+    def close(self) -> None:
+        """Give back files, threads and connections."""
+        for reader in self._readers:
+            reader.close()
+
+    def _read_clip(self, packed: PackedBatch, memory: memoryview, clip: ArrangedClip, watch: Stopwatch) -> np.ndarray:
+        """Read one clip into the batch; returns its last pose."""
+        place = clip.place
+        slots = slots_of(packed, memory, clip)
+        direct = self._dtype is _STORED and not self._standardise
+        staged = {} if direct else self._staged(clip)
+        slots |= {name: memoryview(latents.numpy()).cast("B") for name, latents in staged.items()}
+        due = self._verification.is_due(place.source, place.number)
+        reader = self._readers[place.source]
+        last_pose = read_clip(reader, place, self._latent_shape, list(slots.values()), checked=due, watch=watch)
+        if due:
+            self._verification.passed(place.source, place.number)
+        with watch.measure(Part.COLLATE):
+            for name, latents in staged.items():
+                out = packed.tensor(name)[clip.row, clip.start : clip.start + clip.latents]
+                convert(latents, out, self._standardise.get(name))
+        return last_pose
+
+    def _staged(self, clip: ArrangedClip) -> dict[str, torch.Tensor]:
+        """Memory of this thread for the stored latents of a clip; it stays in the cache from clip to clip."""
+        shape = (len(LATENT_TENSORS), clip.latents, *self._latent_shape)
+        size = int(np.prod(shape))
+        held = getattr(self._staging, "held", None)
+        if held is None or len(held) < size:
+            held = self._staging.held = torch.empty(size, dtype=_STORED)
+        return dict(zip(LATENT_TENSORS, held[:size].view(shape), strict=True))
+
+
+def _open_readers(sources: Sources, read: ReadConfig) -> Sequence[ShardReader]:
+    """A reader for each source; sources of one release share it."""
+    by_root: dict[str, ShardReader] = {}
+    for table in sources.tables:
+        root = table.release.store.root
+        if root not in by_root:
+            by_root[root] = open_shards(table.release, read)
+    return [by_root[table.release.store.root] for table in sources.tables]

@@ -1,0 +1,72 @@
+"""Batches of some steps, in order: read by threads, by worker processes, or by whoever asks for them."""
+
+from collections.abc import Callable, Generator, Sequence
+
+from wsm_data.loaders.batch import Batch, PackedBatch
+from wsm_data.loaders.config import ReadConfig
+from wsm_data.loaders.plan import EpochPlan
+from wsm_data.loaders.prefetch import Prefetch
+from wsm_data.loaders.step_reader import StepReader
+from wsm_data.loaders.timing import Part, Stopwatch, Timing
+from wsm_data.loaders.worker_processes import StepDataset, read_in_processes
+
+BatchStream = Prefetch[Batch] | Generator[Batch, None, None]
+"""Batches one after the other; `close` stops reading and waits until threads and processes have ended."""
+
+
+def open_stream(
+    reader: StepReader,
+    transfer: Callable[[PackedBatch], Batch],
+    plan: EpochPlan,
+    steps: Sequence[int],
+    read: ReadConfig,
+    timing: Timing,
+    *,
+    inline: bool,
+) -> BatchStream:
+    """Begin to read.
+
+    Args:
+        reader: reads a step.
+        transfer: makes the batch of what was read.
+        plan: of the epoch.
+        steps: what is read, in this order.
+        read: threads, workers, and how far to read ahead.
+        timing: adds up the time of all parts.
+        inline: read in the caller's thread, whatever the settings say.
+    """
+
+    def finished(packed: PackedBatch) -> Batch:
+        watch = Stopwatch()
+        with watch.measure(Part.TRANSFER):
+            batch = transfer(packed)
+        timing.add(packed.seconds)
+        timing.add(watch.seconds)
+        return batch
+
+    def announce(step: int) -> None:
+        reader.announce(plan, step)
+
+    def read_step(step: int) -> Batch:
+        return finished(reader.read(plan, step))
+
+    if read.workers and not inline:
+        return _by_processes(StepDataset(reader, plan), steps, read, finished)
+    if read.threads and not inline:
+        return Prefetch(iter(steps), read_step, announce, threads=read.threads, depth=read.prefetch_batches)
+    return _one_by_one(steps, read_step, announce)
+
+
+def _one_by_one(
+    steps: Sequence[int], read_step: Callable[[int], Batch], announce: Callable[[int], None]
+) -> Generator[Batch, None, None]:
+    for step in steps:
+        announce(step)
+        yield read_step(step)
+
+
+def _by_processes(
+    dataset: StepDataset, steps: Sequence[int], read: ReadConfig, finished: Callable[[PackedBatch], Batch]
+) -> Generator[Batch, None, None]:
+    for packed in read_in_processes(dataset, steps, read):
+        yield finished(packed)

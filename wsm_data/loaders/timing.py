@@ -1,0 +1,52 @@
+"""Where the time of a loader goes: seconds by part, added up by all of its threads."""
+
+import threading
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from enum import StrEnum
+
+
+class Part(StrEnum):
+    """What a loader spends time on."""
+
+    STORE = "store"  # reading bytes, from a disk or a store
+    CHECKSUM = "checksum"  # comparing checksums and headers
+    COLLATE = "collate"  # all else that makes a batch of them: standardising, padding, masks
+    TRANSFER = "transfer"  # copying to a device
+    WAIT = "wait"  # what the training loop waited for batches
+
+
+class Timing:
+    """Adds up seconds by part. Threads work at the same time, so the parts may add up to more than passed."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._seconds = dict.fromkeys(Part, 0.0)
+
+    def add(self, seconds: Mapping[Part, float]) -> None:
+        """Add what was measured."""
+        with self._lock:
+            for part, value in seconds.items():
+                self._seconds[part] += value
+
+    def seconds(self) -> dict[Part, float]:
+        """What has been added up so far."""
+        with self._lock:
+            return dict(self._seconds)
+
+
+class Stopwatch:
+    """Measures the parts of one batch, in one thread."""
+
+    def __init__(self) -> None:
+        self.seconds = dict.fromkeys(Part, 0.0)
+
+    @contextmanager
+    def measure(self, part: Part) -> Iterator[None]:
+        """Count the time until the end of the block, errors included, to a part."""
+        start = time.perf_counter()
+        try:
+            yield
+        finally:
+            self.seconds[part] += time.perf_counter() - start
