@@ -143,6 +143,12 @@ def _loaded_codec(config: CodecConfig, digest: str) -> VideoCodec:
     return codec
 
 
+@lru_cache(maxsize=1)
+def _video_memory() -> VideoMemory:
+    """Memory for the videos of a process, which works on one clip after the other."""
+    return VideoMemory()
+
+
 def _prepare(
     batch: Sequence[Unit], scene: _SceneInput, source: IndexedSource, scene_map: SceneMap, config: EncodeConfig
 ) -> Iterator[_Prepared | Outcome]:
@@ -150,7 +156,7 @@ def _prepare(
     units = {unit.id: unit for unit in batch}
     records = [one for one in read_records(records_path(config.index, scene.container.id)) if one.id.text in units]
     # One clip at a time is encoded before the next is read; several at a time need memory each.
-    memory = VideoMemory() if config.codec.batch_clips == 1 else None
+    memory = _video_memory() if config.codec.batch_clips == 1 else None
     for record, frames in iter_episode_frames(source.root, scene.container, records):
         unit = units[record.id.text]
         try:
@@ -216,6 +222,7 @@ def _quality(
 def _finish(config: EncodeConfig, context: StageContext, settled: Settled) -> Finished:
     """Write what the codec says of itself beside the clips, for the release."""
     del settled
+    _video_memory.cache_clear()  # the stages that follow in this process need it for other things
     write_text(codec_path(context.out), json.dumps(asdict(describe_codec(config.codec)), indent=2) + "\n")
     return Finished(outputs=(str(codec_path(context.out).relative_to(context.out)),))
 

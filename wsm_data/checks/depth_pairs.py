@@ -2,11 +2,12 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
+from numba import njit
 
-from wsm_data.geometry.camera import project, unproject
-from wsm_data.geometry.transform import transform_points
+from wsm_data.geometry.camera import pixel_rays
 from wsm_data.schema.arrays import Float32Array, Float64Array
 from wsm_data.schema.camera import Intrinsics
 
@@ -36,8 +37,14 @@ def depth_pair(
 ) -> DepthPair:
     """Two frames of `depth_m`, of the first at most `max_points` pixels, on a square lattice."""
     stride = int(np.ceil(np.sqrt(depth_m[a].size / max_points)))
-    points = unproject(depth_m[a].astype(np.float64), intrinsics)[::stride, ::stride].reshape(-1, 3)
-    return DepthPair(a=a, b=b, points_a_m=points[points[:, 2] > 0], depth_b_m=depth_m[b])
+    rays = _lattice_rays(intrinsics, stride)
+    points = rays * depth_m[a][::stride, ::stride, None].astype(np.float64)
+    return DepthPair(a=a, b=b, points_a_m=points[points[..., 2] > 0], depth_b_m=depth_m[b])
+
+
+@lru_cache(maxsize=4)
+def _lattice_rays(intrinsics: Intrinsics, stride: int) -> Float64Array:
+    return np.ascontiguousarray(pixel_rays(intrinsics)[::stride, ::stride])
 
 
 def relative_errors(pair: DepthPair, T_b_a: Float64Array, intrinsics: Intrinsics) -> Float64Array:
@@ -45,22 +52,33 @@ def relative_errors(pair: DepthPair, T_b_a: Float64Array, intrinsics: Intrinsics
 
     Not a number where frame b does not see the point, has no measurement there, or sees an edge.
     """
-    pixels, z_m = project(transform_points(T_b_a, pair.points_a_m), intrinsics)
-    corner = np.floor(pixels)
-    height, width = pair.depth_b_m.shape
-    inside = (z_m > 0) & (corner >= 0).all(axis=1) & (corner[:, 0] < width - 1) & (corner[:, 1] < height - 1)
-    seen = np.flatnonzero(inside)
-    column, row = corner[seen].astype(np.int64).T
-    around_m = np.stack([pair.depth_b_m[row + dy, column + dx] for dy in (0, 1) for dx in (0, 1)], axis=1)
-    smooth = (around_m > 0).all(axis=1) & (around_m.max(axis=1) <= MAX_EDGE_RATIO * around_m.min(axis=1))
-    seen, around_m = seen[smooth], around_m[smooth].astype(np.float64)
-    errors = np.full(len(z_m), np.nan)
-    errors[seen] = z_m[seen] * _inverse_depth(around_m, (pixels - corner)[seen]) - 1
+    K = np.array([intrinsics.fx, intrinsics.fy, intrinsics.cx, intrinsics.cy])
+    return _warp_errors(pair.points_a_m, pair.depth_b_m, np.ascontiguousarray(T_b_a), K)
+
+
+@njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+def _warp_errors(
+    points_a_m: Float64Array, depth_b_m: Float32Array, T_b_a: Float64Array, K: Float64Array
+) -> Float64Array:
+    """`relative_errors`, point by point; K is (fx, fy, cx, cy)."""
+    height, width = depth_b_m.shape
+    errors = np.full(len(points_a_m), np.nan)
+    for i in range(len(points_a_m)):
+        x, y, z = points_a_m[i]
+        ahead_m = T_b_a[2, 0] * x + T_b_a[2, 1] * y + T_b_a[2, 2] * z + T_b_a[2, 3]
+        if not ahead_m > 0:  # nor where it is no number
+            continue
+        u = K[0] * (T_b_a[0, 0] * x + T_b_a[0, 1] * y + T_b_a[0, 2] * z + T_b_a[0, 3]) / ahead_m + K[2]
+        v = K[1] * (T_b_a[1, 0] * x + T_b_a[1, 1] * y + T_b_a[1, 2] * z + T_b_a[1, 3]) / ahead_m + K[3]
+        if not (u >= 0 and v >= 0 and u < width - 1 and v < height - 1):
+            continue
+        column, row = int(u), int(v)
+        one, two = float(depth_b_m[row, column]), float(depth_b_m[row, column + 1])
+        three, four = float(depth_b_m[row + 1, column]), float(depth_b_m[row + 1, column + 1])
+        nearest, farthest = min(one, two, three, four), max(one, two, three, four)
+        if nearest > 0 and farthest <= MAX_EDGE_RATIO * nearest:
+            # 1 / z is linear in the image of a plane, so that it is 1 / z that is interpolated
+            x, y = u - column, v - row
+            upper, lower = (1 - x) / one + x / two, (1 - x) / three + x / four
+            errors[i] = ahead_m * ((1 - y) * upper + y * lower) - 1
     return errors
-
-
-def _inverse_depth(around_m: Float64Array, fraction: Float64Array) -> Float64Array:
-    """Inverse depth between four pixels [N, 4], bilinear: exact on planes, where 1 / z is linear in the image."""
-    x, y = fraction[:, 0], fraction[:, 1]
-    weights = np.stack([(1 - x) * (1 - y), x * (1 - y), (1 - x) * y, x * y], axis=1)
-    return (weights / around_m).sum(axis=1)

@@ -16,11 +16,16 @@ from wsm_data.schema.depth import DepthEncoding, DepthRange
 
 _Image = TypeVar("_Image", Uint8Array, Uint16Array)
 
+_RESERVED = 4
+"""How many times the first video's memory is reserved; trajectories of a source differ by less in length."""
+
 
 class VideoMemory:
     """Memory that the videos of one trajectory after another are decoded into.
 
     A clip's videos are some 200 MB; asking the system for new pages for each costs as much as decoding the frames.
+    So more is reserved than is asked for: pages that are never written to are only numbers, and a longer trajectory
+    finds the others as they were.
     """
 
     def __init__(self) -> None:
@@ -31,7 +36,7 @@ class VideoMemory:
         size = int(np.prod(shape))
         held = self._held.get(name)
         if held is None or held.dtype != np.dtype(dtype) or len(held) < size:
-            held = self._held[name] = np.empty(size, dtype)
+            held = self._held[name] = np.empty(_RESERVED * size, dtype)
         return held[:size].reshape(shape)
 
 

@@ -6,6 +6,7 @@ and the share of measured pixels in each latent cell is stored beside the latent
 """
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from wsm_data.codecs.base import TEMPORAL_RATIO
@@ -82,9 +83,25 @@ def valid_share(valid: BoolArray, spatial_ratio: int = 16) -> Uint8Array:
     frames, height, width = valid.shape
     if frames % TEMPORAL_RATIO != 1 or height % spatial_ratio or width % spatial_ratio:
         raise ValueError(f"valid must be [1 + 4k, {spatial_ratio} h, {spatial_ratio} w], found {list(valid.shape)}")
-    cells = valid.reshape(frames, height // spatial_ratio, spatial_ratio, width // spatial_ratio, spatial_ratio)
-    in_frame = cells.sum(axis=(2, 4), dtype=np.int64)
+    in_frame = _count_cells(np.ascontiguousarray(valid).view(np.uint8), spatial_ratio)
     later = in_frame[1:].reshape(-1, TEMPORAL_RATIO, *in_frame.shape[1:]).sum(axis=1)
     per_frame = spatial_ratio**2
     shares = np.concatenate([in_frame[:1] / per_frame, later / (TEMPORAL_RATIO * per_frame)])
     return np.rint(shares * _FULL_SHARE).astype(np.uint8)
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _count_cells(ones: Uint8Array, side: int) -> NDArray[np.int64]:
+    """Sums over square cells of every frame; int64 [T, H / side, W / side]."""
+    frames, height, width = ones.shape
+    counts = np.zeros((frames, height // side, width // side), np.int64)
+    column_sums = np.empty(width, np.uint32)
+    for frame in range(frames):
+        for row in range(counts.shape[1]):
+            column_sums[:] = 0
+            for y in range(row * side, (row + 1) * side):
+                for x in range(width):
+                    column_sums[x] += ones[frame, y, x]
+            for x in range(width):
+                counts[frame, row, x // side] += column_sums[x]
+    return counts

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from wsm_data.checks.depth_pairs import depth_pair, relative_errors
+from wsm_data.geometry.camera import project
+from wsm_data.geometry.transform import transform_points, transforms_from_vectors
 from wsm_data.schema.camera import Intrinsics
 
 INTRINSICS = Intrinsics(fx=40.0, fy=40.0, cx=31.5, cy=23.5, width=64, height=48)
@@ -61,3 +63,26 @@ def test_pixels_without_measurement_are_no_points():
     depth = wall(4.0)
     depth[:24] = 0
     assert len(depth_pair(0, 1, {0: depth, 1: depth}, INTRINSICS, 4000).points_a_m) == 24 * 64
+
+
+def test_points_are_warped_as_by_the_projection_of_the_geometry_module():
+    """A slow reference: the corner of the room from a camera that moved and turned, all formulas from `geometry`."""
+    rng = np.random.default_rng(0)
+    depth = {0: wall(4.0), 1: (3.5 + np.add.outer(0.01 * np.arange(48), 0.004 * np.arange(64))).astype(np.float32)}
+    depth[1][rng.random((48, 64)) < 0.05] = 0
+    pair = depth_pair(0, 1, depth, INTRINSICS, max_points=4000)
+    T_b_a = transforms_from_vectors(np.array([0.2, -0.1, -0.4, 0.99, 0.02, -0.1, 0.03]))
+    pixels, z_m = project(transform_points(T_b_a, pair.points_a_m), INTRINSICS)
+    compared = 0
+    for (u, v), z, error in zip(pixels, z_m, relative_errors(pair, T_b_a, INTRINSICS), strict=True):
+        column, row = int(np.floor(u)), int(np.floor(v))
+        around = depth[1][max(row, 0) : row + 2, max(column, 0) : column + 2].astype(np.float64)
+        visible = column >= 0 and row >= 0 and around.shape == (2, 2) and around.min() > 0
+        if not visible or around.max() > 1.1 * around.min():
+            assert np.isnan(error)
+            continue
+        x, y = u - column, v - row
+        inverse_m = np.array([1 - y, y]) @ (1 / around) @ np.array([1 - x, x])
+        assert error == pytest.approx(z * inverse_m - 1, abs=1e-12)
+        compared += 1
+    assert compared > 500
