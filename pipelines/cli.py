@@ -5,6 +5,7 @@ import importlib
 import inspect
 import sys
 from collections.abc import Callable, Mapping
+from enum import StrEnum
 from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any
@@ -15,9 +16,20 @@ from typer.core import TyperGroup
 from pipelines.engines.choice import EngineName
 from pipelines.recipe import recipe_summaries
 from pipelines.registry import STAGES, StageEntry
+from wsm_data.curation.audit_finding import Severity
+from wsm_data.curation.split import SplitBy
 from wsm_data.errors import WsmError
 
 _INTERRUPTED_EXIT_CODE = 130
+
+
+class FailOn(StrEnum):
+    """From which severity on an audit fails."""
+
+    INFO = Severity.INFO.value
+    WARNING = Severity.WARNING.value
+    ERROR = Severity.ERROR.value
+    NEVER = "never"
 
 
 class _Commands(TyperGroup):
@@ -237,3 +249,22 @@ def audit_run(
 ) -> None:
     """Prove from its ledger that a training run saw each clip once an epoch."""
     _load("audit_run").audit_run(ledger, release or [], selection or [], clip, epoch, step)
+
+
+@app.command("audit")
+def audit(
+    release: ReleaseArgument,
+    split_by: Annotated[
+        SplitBy, typer.Option("--split-by", help="What the split promises to keep on one side.")
+    ] = SplitBy.TRAJECTORY,
+    fail_on: Annotated[
+        FailOn, typer.Option("--fail-on", help="Mildest finding that ends with exit code 4.")
+    ] = FailOn.ERROR,
+    near_m: Annotated[
+        float, typer.Option("--near", help="Paths that stay this close, in metres, count as near-duplicates.")
+    ] = 0.5,
+    as_json: Annotated[bool, typer.Option("--json", help="All findings as JSON.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress bar.")] = False,
+) -> None:
+    """Find split leaks, repeated content and contradicting labels of a release."""
+    _load("audit").audit(release, split_by, fail_on.value, near_m, as_json, quiet)
