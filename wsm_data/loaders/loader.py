@@ -7,14 +7,14 @@ from dataclasses import replace
 from types import TracebackType
 from typing import Any
 
-import torch.distributed
 import torch.utils.data
 
 from wsm_data.errors import ConfigError
 from wsm_data.loaders.batch import Batch
 from wsm_data.loaders.config import LoaderConfig
 from wsm_data.loaders.ledger import LedgerWriter
-from wsm_data.loaders.plan import EpochPlan, PlanReport, plan_epoch, rows_per_rank
+from wsm_data.loaders.plan import EpochPlan, PlanReport, rows_per_rank
+from wsm_data.loaders.ranks import place_among_ranks
 from wsm_data.loaders.source_table import Sources, open_sources
 from wsm_data.loaders.state import loader_state, restore, state_to_json
 from wsm_data.loaders.step_reader import StepReader
@@ -31,13 +31,21 @@ class ClipLoader(torch.utils.data.IterableDataset[Batch]):
     Within a worker of a torch DataLoader (`batch_size=None`), worker w of n gives the steps w, w + n, ...
     """
 
-    def __init__(self, config: LoaderConfig, *, rank: int | None = None, world_size: int | None = None):
+    def __init__(
+        self,
+        config: LoaderConfig,
+        *,
+        rank: int | None = None,
+        world_size: int | None = None,
+        sources: Sources | None = None,
+    ):
         """Open the sources; no clip is read yet.
 
         Args:
             config: what is read, in which order, and how.
             rank: number of this rank; None: that of torch.distributed, 0 where it is not initialised.
             world_size: number of ranks; None: that of torch.distributed, 1 where it is not initialised.
+            sources: what stands in for the sources of `config`, made from them, such as queries; None: the clips.
 
         Raises:
             ConfigError: the settings contradict themselves, the sources, or this machine.
@@ -45,9 +53,9 @@ class ClipLoader(torch.utils.data.IterableDataset[Batch]):
             ValueError: there is no such rank.
         """
         self._config = config
-        self._rank, self._world_size = _place_among_ranks(rank, world_size)
+        self._rank, self._world_size = place_among_ranks(rank, world_size)
         rows_per_rank(config.order, self._world_size)
-        self._sources = open_sources(config.sources)
+        self._sources = open_sources(config.sources) if sources is None else sources
         manifest = self._sources.tables[0].release.manifest
         self._transfer = open_transfer(config.read, manifest)
         self._reader = self._open_reader()
@@ -62,7 +70,7 @@ class ClipLoader(torch.utils.data.IterableDataset[Batch]):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Cross to another process as settings and a place; what is open stays here."""
-        return _reopened, (self._config, self._rank, self._world_size, self.state_dict())
+        return _reopened, (self._config, self._rank, self._world_size, self._sources, self.state_dict())
 
     @property
     def sources(self) -> Sources:
@@ -77,7 +85,7 @@ class ClipLoader(torch.utils.data.IterableDataset[Batch]):
             ConfigError: the epoch has no step, or a clip does not fit into a packed row.
         """
         if self._plan is None or self._plan.epoch != self._epoch:
-            self._plan = plan_epoch(self._sources.layouts, self._config.order, self._epoch)
+            self._plan = self._sources.plan(self._config.order, self._epoch)
         return self._plan
 
     @property
@@ -196,18 +204,6 @@ class ClipLoader(torch.utils.data.IterableDataset[Batch]):
         return LedgerWriter(folder, identity, self._rank, self._world_size) if folder else None
 
 
-def _place_among_ranks(rank: int | None, world_size: int | None) -> tuple[int, int]:
-    if (rank is None) != (world_size is None):
-        raise ValueError(f"rank and world_size belong together, found rank = {rank}, world_size = {world_size}")
-    if rank is None or world_size is None:
-        together = torch.distributed.is_available() and torch.distributed.is_initialized()
-        rank = torch.distributed.get_rank() if together else 0
-        world_size = torch.distributed.get_world_size() if together else 1
-    if not 0 <= rank < world_size:
-        raise ValueError(f"rank must lie in [0, world_size = {world_size}), found {rank}")
-    return rank, world_size
-
-
 def _require_fit_for_worker(config: LoaderConfig) -> None:
     """What only the training process can do must not be asked of a worker of somebody else's DataLoader."""
     asked = {"ledger": config.ledger, "workers": config.read.workers, "pin_memory": config.read.pin_memory}
@@ -219,7 +215,9 @@ def _require_fit_for_worker(config: LoaderConfig) -> None:
         )
 
 
-def _reopened(config: LoaderConfig, rank: int, world_size: int, state: Mapping[str, Any]) -> ClipLoader:
-    loader = ClipLoader(config, rank=rank, world_size=world_size)
+def _reopened(
+    config: LoaderConfig, rank: int, world_size: int, sources: Sources, state: Mapping[str, Any]
+) -> ClipLoader:
+    loader = ClipLoader(config, rank=rank, world_size=world_size, sources=sources)
     loader.load_state_dict(state)
     return loader

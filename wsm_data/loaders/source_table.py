@@ -17,8 +17,9 @@ import pyarrow.compute as pc
 
 from wsm_data.errors import ConfigError
 from wsm_data.files.digest import sha256_bytes
-from wsm_data.loaders.config import SourceConfig
+from wsm_data.loaders.config import OrderConfig, SourceConfig
 from wsm_data.loaders.order import SourceLayout
+from wsm_data.loaders.plan import EpochPlan, plan_epoch
 from wsm_data.loaders.stable_hash import Int64Array
 from wsm_data.shards.index_row import IndexRow
 from wsm_data.shards.release import Release, open_release
@@ -35,7 +36,8 @@ class SourceTable:
         config: what was asked for.
         release: the release; its index is read column by column.
         selection: name of the selection, empty for none.
-        rows: rows of the index that the source has, ascending; int64 [clips].
+        rows: rows of the index that the source has, ascending, one more than once where a clip is to be read for
+            several purposes; int64 [clips].
         base: ref of its first clip.
     """
 
@@ -92,8 +94,12 @@ class SourceTable:
     def _shard_column(self) -> tuple[np.ndarray, tuple[str, ...]]:
         return self.release.index.codes("shard")
 
+    @cached_property
+    def _has_all_rows(self) -> bool:
+        return len(self.rows) == len(self.release.index) and bool((np.diff(self.rows) == 1).all())
+
     def _of_source(self, column: np.ndarray) -> np.ndarray:
-        return column if len(self.rows) == len(column) else column[self.rows]
+        return column if self._has_all_rows else column[self.rows]
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,6 +114,10 @@ class Sources:
     tables: tuple[SourceTable, ...]
     duplicates: int
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Cross to another process as settings: files stay here, and are opened again there."""
+        return open_sources, ([table.config for table in self.tables],)
+
     @property
     def clips(self) -> int:
         """Clips of all sources; a ref is a number below it."""
@@ -117,6 +127,14 @@ class Sources:
     def layouts(self) -> tuple[SourceLayout, ...]:
         """What the order depends on."""
         return tuple(table.layout for table in self.tables)
+
+    def plan(self, order: OrderConfig, epoch: int) -> EpochPlan:
+        """Plan an epoch.
+
+        Raises:
+            ConfigError: a clip does not fit into a packed row, or the epoch has no step.
+        """
+        return plan_epoch(self.layouts, order, epoch)
 
     def locate(self, ref: int) -> tuple[SourceTable, int]:
         """The source of a clip, and the number of the clip in the source's table.
