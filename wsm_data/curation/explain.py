@@ -3,6 +3,7 @@
 A million clips share few texts: values are written with three digits, so each text is made once and then looked up.
 """
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -20,6 +21,7 @@ _NOTABLE = 0.5
 
 _DIGITS = 3
 _NO_UNIT = ("", "ratio")
+_UNIT_SUFFIX = re.compile(r"_(m|rad|share|ratio|rad_per_frame)$")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -76,7 +78,7 @@ def value_text(value: float, unit: str) -> str:
 
 def score_label(info: ScorerInfo) -> str:
     """Name of a score in words, without the unit that follows the number."""
-    return info.name.removesuffix(f"_{info.unit}").replace("_", " ")
+    return _UNIT_SUFFIX.sub("", info.name).replace("_", " ")
 
 
 def _shares(scores: Sequence[ExplainedScore]) -> Float64Array:

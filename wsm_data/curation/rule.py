@@ -17,7 +17,15 @@ from wsm_data.errors import ConfigError
 from wsm_data.files.typed_toml import did_you_mean
 from wsm_data.schema.arrays import Float32Array, Float64Array
 
-GEOMETRY_WEIGHTS: Mapping[str, float] = MappingProxyType({"detour": 1.0})
+GEOMETRY_WEIGHTS: Mapping[str, float] = MappingProxyType(
+    {
+        "detour_ratio": 1.0,
+        "passage_narrowest_m": 1.0,
+        "dead_end_share": 1.0,
+        "clearance_tight_share": 1.0,
+        "goal_behind_walls_share": 1.0,
+    }
+)
 """The default rule, which needs no model."""
 
 MODEL_ORDER = ("rollout_unsafe_share", "rollout_mean_cost")
