@@ -41,7 +41,7 @@ _FAILURES_OF_LIBRARIES = {
 }
 _PASSING_FAILURES_OF_LIBRARIES = {
     "aiohttp": ("ClientError",),
-    "botocore.exceptions": ("HTTPClientError", "ConnectionError", "IncompleteReadError"),
+    "botocore.exceptions": ("HTTPClientError", "ConnectionError", "IncompleteReadError", "FlexibleChecksumError"),
     "botocore.parsers": ("ResponseParserError",),
 }
 """What s3fs and fsspec's HTTP file system let through beside OSError: s3fs translates the answers of a store to it, but

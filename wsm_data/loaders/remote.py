@@ -55,7 +55,7 @@ def read_exactly(store: FsspecStore, span: Span) -> memoryview:
     except FileNotFoundError as error:
         raise missing_shard(store.root, span.shard) from error
     if len(data) != span.size:  # the store has made sure that the shard ends there
-        raise short_shard(store.root, span, span.offset + len(data))
+        raise short_shard(store.root, span, store.size_bytes(span.shard))
     return memoryview(data)
 
 

@@ -18,6 +18,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 SLOW_DOWN = (
     b"<?xml version='1.0'?><Error><Code>SlowDown</Code><Message>Please reduce your request rate.</Message></Error>"
 )
+DENIED = b"<?xml version='1.0'?><Error><Code>AccessDenied</Code><Message>Access Denied</Message></Error>"
 NO_LISTING = (
     b"<?xml version='1.0'?><ListBucketResult xmlns='http://s3.amazonaws.com/doc/2006-03-01/'><IsTruncated>false"
     b"</IsTruncated><KeyCount>0</KeyCount></ListBucketResult>"
@@ -27,6 +28,7 @@ _UPSTREAM_TIMEOUT_S = 30.0
 
 class Fault(StrEnum):
     SLOW_DOWN = "503 SlowDown"
+    FORBIDDEN = "403 AccessDenied"
     RESET = "connection reset before the answer"
     RESET_IN_BODY = "connection reset in the middle of the body"
     CUT_BODY = "connection closed in the middle of the body"
@@ -150,6 +152,8 @@ class _Handler(BaseHTTPRequestHandler):
             self._reset()
         elif fault is Fault.SLOW_DOWN:
             self._answer(503, {"Content-Type": "application/xml"}, SLOW_DOWN)
+        elif fault is Fault.FORBIDDEN:
+            self._answer(403, {"Content-Type": "application/xml"}, DENIED)
         elif fault is Fault.HANG:
             self._hang()
         elif fault is Fault.STALE_LISTING:
