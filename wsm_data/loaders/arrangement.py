@@ -6,14 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from wsm_data.loaders.batch import NO_SEQUENCE, POSE_SLOTS, BatchLayout, PackedBatch
+from wsm_data.loaders.batch import LATENT_TENSORS, NO_SEQUENCE, POSE_SLOTS, BatchLayout, layout_of
 from wsm_data.loaders.clip_reads import POSE_BYTES, ClipPlace
 from wsm_data.loaders.plan import EpochPlan
-from wsm_data.schema.clip import TEMPORAL_RATIO
 
 ANCHOR_SLOTS = POSE_SLOTS - 1
 """Slots of latent 0 that repeat the first pose: raw frame f of a clip lies in its slot `ANCHOR_SLOTS` + f."""
 
+_READ_TENSORS = ("rgb", "depth", "depth_valid", "poses")
 _IDENTITY = np.array([0, 0, 0, 1, 0, 0, 0], np.float32)
 
 
@@ -32,11 +32,6 @@ class ArrangedClip:
     row: int
     start: int
     latents: int
-
-    @property
-    def frames(self) -> int:
-        """Raw frames that are taken."""
-        return 1 + TEMPORAL_RATIO * (self.latents - 1)
 
 
 def arrange(rows: Sequence[np.ndarray], places: Sequence[ClipPlace], plan: EpochPlan) -> list[ArrangedClip]:
@@ -61,72 +56,82 @@ def batch_layout(
 ) -> BatchLayout:
     """The sizes of a batch: rows as long as the longest one, or of `row_latents` where they are packed; never empty."""
     longest = max((clip.start + clip.latents for clip in clips), default=1)
-    return BatchLayout(
-        rows=rows,
-        row_latents=plan.order.row_latents or longest,
-        sequences=len(clips),
-        latent_shape=latent_shape,
-        dtype=dtype,
-    )
+    return layout_of(rows, plan.order.row_latents or longest, len(clips), latent_shape, dtype)
 
 
-def slots_of(packed: PackedBatch, memory: memoryview, clip: ArrangedClip) -> dict[str, memoryview]:
+def slots_of(layout: BatchLayout, memory: memoryview, clip: ArrangedClip) -> dict[str, memoryview]:
     """Memory of a clip in each tensor that is read from its shard.
 
     Args:
-        packed: the batch.
-        memory: its block, as bytes.
+        layout: of the batch.
+        memory: block of the batch, as bytes.
         clip: the clip.
 
     Returns:
         By name of the tensor, the bytes from the clip's first latent to its last; for `poses`, from raw frame 0 on.
     """
-    slots: dict[str, memoryview] = {}
-    for name in ("rgb", "depth", "depth_valid", "poses"):
-        place = packed.layout.tensors[name]
-        latent_bytes = place.item_bytes // packed.layout.row_latents
-        first = place.offset + clip.row * place.item_bytes + clip.start * latent_bytes
-        slots[name] = memory[first : first + clip.latents * latent_bytes]
+    slots = {name: memory[_stretch(layout, name, clip.row, clip.start, clip.latents)] for name in _READ_TENSORS}
     slots["poses"] = slots["poses"][ANCHOR_SLOTS * POSE_BYTES :]
     return slots
 
 
-def describe(packed: PackedBatch, clips: Sequence[ArrangedClip], chunk_size: np.ndarray, goals: np.ndarray) -> None:
+def describe(
+    layout: BatchLayout,
+    memory: memoryview,
+    clips: Sequence[ArrangedClip],
+    *,
+    refs: np.ndarray,
+    chunk_size: np.ndarray,
+    goals: Sequence[np.ndarray],
+) -> None:
     """Fill in everything but what was read: masks, lengths, goals, anchors, and zeros where there is no clip.
 
     Args:
-        packed: the batch, in memory of the processor.
-        clips: its clips.
+        layout: of the batch.
+        memory: block of the batch, as bytes.
+        clips: the clips of the batch.
+        refs: their refs; int64 [N].
         chunk_size: chunk size of each; int64 [N].
-        goals: last camera position of each, m; float32 [N, 3].
+        goals: last camera position of each, m; N of float32 [3].
     """
-    arrays = {name: packed.tensor(name).numpy() for name in ("still", "sequence_id", "latent_index", "poses")}
-    still, poses = (
-        arrays[name].reshape(packed.layout.rows, -1, *arrays[name].shape[3:]) for name in ("still", "poses")
-    )
-    still[:] = False
-    arrays["sequence_id"][:] = NO_SEQUENCE
-    arrays["latent_index"][:] = 0
-    used = [0] * packed.layout.rows
+    arrays = {name: _array(layout, memory, name) for name in layout.tensors if name not in LATENT_TENSORS}
+    by_slot = (layout.rows, POSE_SLOTS * layout.row_latents)
+    still, poses = arrays["still"].reshape(by_slot), arrays["poses"].reshape(*by_slot, 7)
+    still[:], arrays["sequence_id"][:], arrays["latent_index"][:] = False, NO_SEQUENCE, 0
+    used = [0] * layout.rows
     for number, clip in enumerate(clips):
         end = used[clip.row] = clip.start + clip.latents
         arrays["sequence_id"][clip.row, clip.start : end] = number
         arrays["latent_index"][clip.row, clip.start : end] = np.arange(clip.latents)
-        first = POSE_SLOTS * clip.start
-        poses[clip.row, first : first + ANCHOR_SLOTS] = _IDENTITY
-        real = clip.place.frames - clip.place.padded_frames
-        still[clip.row, first + ANCHOR_SLOTS + real : POSE_SLOTS * end] = True
-    for name in ("rgb", "depth", "depth_valid", "poses"):
-        tensor = packed.tensor(name)
-        for row, end in enumerate(used):
-            if end < packed.layout.row_latents:
-                tensor[row, end:] = 0
-    numbers = {
-        "row": [clip.row for clip in clips],
-        "start": [clip.start for clip in clips],
-        "lengths": [clip.latents for clip in clips],
-        "chunk_size": chunk_size,
-        "goal_camera0_m": goals,
-    }
-    for name, values in numbers.items():
-        packed.tensor(name).numpy()[:] = values
+        frame_0 = POSE_SLOTS * clip.start + ANCHOR_SLOTS
+        poses[clip.row, frame_0 - ANCHOR_SLOTS : frame_0] = _IDENTITY
+        real_frames = clip.place.frames - clip.place.padded_frames
+        still[clip.row, frame_0 + real_frames : POSE_SLOTS * end] = True
+    for row, end in enumerate(used):
+        _clear(layout, memory, row, end)
+    arrays["row"][:] = [clip.row for clip in clips]
+    arrays["start"][:] = [clip.start for clip in clips]
+    arrays["lengths"][:] = [clip.latents for clip in clips]
+    arrays["refs"][:], arrays["chunk_size"][:] = refs, chunk_size
+    for number, goal in enumerate(goals):
+        arrays["goal_camera0_m"][number] = goal
+
+
+def _clear(layout: BatchLayout, memory: memoryview, row: int, end: int) -> None:
+    """Zeros behind the last sequence of a row."""
+    unused = layout.row_latents - end
+    for name in _READ_TENSORS if unused else ():
+        np.frombuffer(memory[_stretch(layout, name, row, end, unused)], np.uint8)[:] = 0
+
+
+def _stretch(layout: BatchLayout, name: str, row: int, start: int, latents: int) -> slice:
+    """Bytes of some latents of a row in a tensor."""
+    place = layout.tensors[name]
+    row_stride, latent_stride = place.strides[:2]
+    first = place.offset + (row * row_stride + start * latent_stride) * place.dtype.itemsize
+    return slice(first, first + latents * latent_stride * place.dtype.itemsize)
+
+
+def _array(layout: BatchLayout, memory: memoryview, name: str) -> np.ndarray:
+    place = layout.tensors[name]
+    return np.ndarray(place.shape, str(place.dtype).removeprefix("torch."), memory, place.offset)

@@ -6,8 +6,9 @@ memory is used again as a whole.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from math import prod
+from types import MappingProxyType
 
 import torch
 
@@ -78,6 +79,28 @@ class Batch:
 
 
 @dataclass(frozen=True, kw_only=True)
+class TensorPlace:
+    """Where a tensor lies in the block of its batch.
+
+    Attributes:
+        offset: first byte, a multiple of 64.
+        dtype: its dtype.
+        shape: its shape.
+        strides: of each axis in C order, in elements.
+    """
+
+    offset: int
+    dtype: torch.dtype
+    shape: tuple[int, ...]
+    strides: tuple[int, ...]
+
+    @property
+    def end(self) -> int:
+        """First byte behind the tensor."""
+        return self.offset + prod(self.shape) * self.dtype.itemsize
+
+
+@dataclass(frozen=True, kw_only=True)
 class BatchLayout:
     """Sizes that decide where each tensor of a batch lies.
 
@@ -96,56 +119,44 @@ class BatchLayout:
     dtype: torch.dtype
 
     @cached_property
-    def tensors(self) -> dict[str, "TensorPlace"]:
+    def tensors(self) -> Mapping[str, TensorPlace]:
         """Place of each tensor of `Batch`, by name."""
-        rows, row_latents, (_, height, width) = self.rows, self.row_latents, self.latent_shape
+        latents, (_, height, width) = (self.rows, self.row_latents), self.latent_shape
         shapes: dict[str, tuple[torch.dtype, tuple[int, ...]]] = {
-            "rgb": (self.dtype, (rows, row_latents, *self.latent_shape)),
-            "depth": (self.dtype, (rows, row_latents, *self.latent_shape)),
-            "depth_valid": (torch.uint8, (rows, row_latents, height, width)),
-            "poses": (torch.float32, (rows, row_latents, POSE_SLOTS, 7)),
-            "still": (torch.bool, (rows, row_latents, POSE_SLOTS)),
-            "sequence_id": (torch.int32, (rows, row_latents)),
-            "latent_index": (torch.int32, (rows, row_latents)),
+            "rgb": (self.dtype, (*latents, *self.latent_shape)),
+            "depth": (self.dtype, (*latents, *self.latent_shape)),
+            "depth_valid": (torch.uint8, (*latents, height, width)),
+            "poses": (torch.float32, (*latents, POSE_SLOTS, 7)),
+            "still": (torch.bool, (*latents, POSE_SLOTS)),
+            "sequence_id": (torch.int32, latents),
+            "latent_index": (torch.int32, latents),
             **dict.fromkeys(("row", "start", "lengths", "chunk_size", "refs"), (torch.int64, (self.sequences,))),
             "goal_camera0_m": (torch.float32, (self.sequences, 3)),
         }
         places: dict[str, TensorPlace] = {}
         offset = 0
         for name, (dtype, shape) in shapes.items():
-            places[name] = TensorPlace(offset=offset, dtype=dtype, shape=shape)
-            offset = -(-places[name].end // _ALIGNMENT_BYTES) * _ALIGNMENT_BYTES
-        return places
+            strides = tuple(prod(shape[axis + 1 :]) for axis in range(len(shape)))
+            places[name] = TensorPlace(offset=offset, dtype=dtype, shape=shape, strides=strides)
+            offset = _aligned(places[name].end)
+        return MappingProxyType(places)
 
     @property
     def size_bytes(self) -> int:
-        """Bytes of the block that holds all tensors."""
-        return max(place.end for place in self.tensors.values())
+        """Bytes of the block that holds all tensors, a multiple of 64."""
+        return _aligned(max(place.end for place in self.tensors.values()))
 
 
-@dataclass(frozen=True, kw_only=True)
-class TensorPlace:
-    """Where a tensor lies in the block.
+@lru_cache(maxsize=64)
+def layout_of(
+    rows: int, row_latents: int, sequences: int, latent_shape: tuple[int, int, int], dtype: torch.dtype
+) -> BatchLayout:
+    """The layout of these sizes; most batches of a run share one."""
+    return BatchLayout(rows=rows, row_latents=row_latents, sequences=sequences, latent_shape=latent_shape, dtype=dtype)
 
-    Attributes:
-        offset: first byte.
-        dtype: its dtype.
-        shape: its shape.
-    """
 
-    offset: int
-    dtype: torch.dtype
-    shape: tuple[int, ...]
-
-    @property
-    def item_bytes(self) -> int:
-        """Bytes of what lies behind the first axis: of one row, or of one sequence."""
-        return prod(self.shape[1:]) * self.dtype.itemsize
-
-    @property
-    def end(self) -> int:
-        """First byte behind the tensor."""
-        return self.offset + prod(self.shape) * self.dtype.itemsize
+def _aligned(offset: int) -> int:
+    return -(-offset // _ALIGNMENT_BYTES) * _ALIGNMENT_BYTES
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -168,12 +179,15 @@ class PackedBatch:
     step: int
     seconds: Mapping[Part, float] = field(default_factory=dict)
 
-    def tensor(self, name: str) -> torch.Tensor:
-        """A tensor of the batch, as a view of the block."""
-        place = self.layout.tensors[name]
-        return self.block[place.offset : place.end].view(place.dtype).view(place.shape)
+    def tensors(self) -> dict[str, torch.Tensor]:
+        """The tensors of the batch by name, as views of the block."""
+        places = self.layout.tensors
+        wholes = {dtype: self.block.view(dtype) for dtype in {place.dtype for place in places.values()}}
+        return {
+            name: wholes[place.dtype].as_strided(place.shape, place.strides, place.offset // place.dtype.itemsize)
+            for name, place in places.items()
+        }
 
     def unpacked(self) -> Batch:
         """The batch itself; all tensors are views of the block."""
-        tensors = {name: self.tensor(name) for name in self.layout.tensors}
-        return Batch(**tensors, keys=self.keys, epoch=self.epoch, step=self.step)
+        return Batch(**self.tensors(), keys=self.keys, epoch=self.epoch, step=self.step)

@@ -4,9 +4,11 @@ The members that a batch needs stand one after the other in the shard, with thei
 read puts each of them where it belongs; what lies between goes into memory that nobody looks at.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from math import prod
+from operator import add, sub
 
 import numpy as np
 import xxhash
@@ -65,17 +67,23 @@ class ClipPlace:
     @property
     def frames(self) -> int:
         """T, raw frames of the whole clip."""
-        return 1 + TEMPORAL_RATIO * (self.latents - 1)
+        return frames_of(self.latents)
 
     @property
     def where(self) -> str:
         """Shard and clip, for messages."""
         return f"{self.shard}, clip {self.key}"
 
-    def shapes(self, latent_shape: tuple[int, int, int]) -> dict[str, tuple[int, ...]]:
-        """Shape of each member that is read."""
-        axes = dict(zip("FChwT", (self.latents, *latent_shape, self.frames), strict=True))
-        return {name: shape_of(name, axes) for name in READ_MEMBERS}
+    @property
+    def gaps(self) -> tuple[int, ...]:
+        """Bytes in front of each member: padding of the one before, and headers."""
+        ends = (self.clip_offset, *map(add, self.offsets, self.sizes))
+        return tuple(map(sub, self.offsets, ends))
+
+
+def frames_of(latents: int) -> int:
+    """Raw frames of so many latents."""
+    return 1 + TEMPORAL_RATIO * (latents - 1)
 
 
 def clip_places(sources: Sources, refs: np.ndarray) -> list[ClipPlace]:
@@ -140,10 +148,10 @@ def read_clip(
         IntegrityError: the shard is missing or ends too early, its bytes are not those that the index vouches for, or
             the index places members where they cannot be; names shard and clip.
     """
-    shapes = place.shapes(latent_shape)
+    shapes = _shapes(place.latents, latent_shape)
     _require_sound(place, shapes)
-    headers = [memoryview(bytearray(size)) if checked else _NOTHING for size in _gaps(place)]
-    tails = [memoryview(bytearray(size)) for size in _tail_sizes(place, slots, checked)]
+    headers = [_memory(size) for size in place.gaps] if checked else [_NOTHING] * len(slots)
+    tails = [_memory(size) for size in _tail_sizes(place, slots, checked)]
     for reads in range(1, MAX_READS + 1):
         with watch.measure(Part.STORE):
             _fill(reader, place, _pieces(place, headers, slots, tails))
@@ -157,10 +165,21 @@ def read_clip(
     return np.frombuffer(last[-POSE_BYTES:], STORED_DTYPES["poses"])
 
 
-def _gaps(place: ClipPlace) -> list[int]:
-    """Bytes in front of each member: padding of the one before, and headers."""
-    ends = [offset + size for offset, size in zip(place.offsets, place.sizes, strict=True)]
-    return [offset - end for end, offset in zip([place.clip_offset, *ends], place.offsets, strict=False)]
+@lru_cache(maxsize=4096)
+def _shapes(latents: int, latent_shape: tuple[int, int, int]) -> tuple[tuple[int, ...], ...]:
+    """Shape of each member that is read of a clip of so many latents."""
+    axes = dict(zip("FChwT", (latents, *latent_shape, frames_of(latents)), strict=True))
+    return tuple(shape_of(name, axes) for name in READ_MEMBERS)
+
+
+@lru_cache(maxsize=4096)
+def _sizes(shapes: tuple[tuple[int, ...], ...]) -> tuple[int, ...]:
+    """Bytes of each member that is read."""
+    return tuple(prod(shape) * STORED_DTYPES[name].itemsize for name, shape in zip(READ_MEMBERS, shapes, strict=True))
+
+
+def _memory(size_bytes: int) -> memoryview:
+    return memoryview(bytearray(size_bytes)) if size_bytes else _NOTHING
 
 
 def _tail_sizes(place: ClipPlace, slots: Sequence[memoryview], checked: bool) -> list[int]:
@@ -203,15 +222,15 @@ def _fill(reader: ShardReader, place: ClipPlace, pieces: Iterable[tuple[int, mem
 
 def _damage(
     place: ClipPlace,
-    shapes: Mapping[str, tuple[int, ...]],
+    shapes: Sequence[tuple[int, ...]],
     headers: Sequence[memoryview],
     slots: Sequence[memoryview],
     tails: Sequence[memoryview],
 ) -> Iterator[str]:
     """What is wrong with the bytes that were read, member by member."""
     before = 0  # bytes of the member before, in whole blocks and in part
-    for name, header, size in zip(READ_MEMBERS, headers, place.sizes, strict=True):
-        if header != bytes(padded(before) - before) + array_header(place.key, name, shapes[name]):
+    for name, header, shape, size in zip(READ_MEMBERS, headers, shapes, place.sizes, strict=True):
+        if header != bytes(padded(before) - before) + array_header(place.key, name, shape):
             yield f"the header of {name}.npy, or the padding before it, is not that of this clip"
         before = NPY_HEADER_BYTES + size
     for name, wanted, slot, tail in zip(READ_MEMBERS, place.checksums, slots, tails, strict=True):
@@ -228,10 +247,10 @@ def _checksum(slot: memoryview, tail: memoryview) -> int:
     return state.intdigest()
 
 
-def _require_sound(place: ClipPlace, shapes: Mapping[str, tuple[int, ...]]) -> None:
+def _require_sound(place: ClipPlace, shapes: tuple[tuple[int, ...], ...]) -> None:
     """The index must give the members the sizes of a clip, one behind the other, with room for headers between them."""
-    sizes = tuple(prod(shapes[name]) * STORED_DTYPES[name].itemsize for name in READ_MEMBERS)
-    if place.sizes != sizes or not all(0 < gap <= MAX_GAP_BYTES for gap in _gaps(place)):
+    gaps = place.gaps
+    if place.sizes != _sizes(shapes) or min(gaps) <= 0 or max(gaps) > MAX_GAP_BYTES:
         raise IntegrityError(
             f"{place.where}: {INDEX_NAME} places members where a clip of {place.latents} latents does not have them, "
             f"at {place.offsets} with {place.sizes} bytes; restore the index"

@@ -1,7 +1,7 @@
 """One step of one rank: its clips read into one block of memory, checked, standardised, and described."""
 
 import threading
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -10,10 +10,11 @@ import torch
 
 from wsm_data.errors import ConfigError
 from wsm_data.loaders.arrangement import ArrangedClip, arrange, batch_layout, describe, slots_of
-from wsm_data.loaders.batch import LATENT_DTYPES, LATENT_TENSORS, PackedBatch
+from wsm_data.loaders.batch import LATENT_DTYPES, LATENT_TENSORS, BatchLayout, PackedBatch
 from wsm_data.loaders.buffers import BufferPool
 from wsm_data.loaders.clip_reads import clip_places, read_clip, span_of
 from wsm_data.loaders.config import ReadConfig
+from wsm_data.loaders.local_shards import LocalShards
 from wsm_data.loaders.open_shards import open_shards
 from wsm_data.loaders.plan import EpochPlan, chunk_sizes
 from wsm_data.loaders.shard_reader import ShardReader
@@ -53,10 +54,12 @@ class StepReader:
         self._latent_shape = (codec.channels, *cells)
         self._dtype = _STORED if as_stored else LATENT_DTYPES[read.dtype]
         self._standardise = standardisations(manifest) if read.standardise and not as_stored else {}
+        self._converts = self._dtype is not _STORED or bool(self._standardise)
         self._verification = Verification(read.verify, [len(table) for table in sources.tables])
         self._pool = BufferPool(keep=read.prefetch_batches + 2, pinned=read.pin_memory)
         self._staging = threading.local()
         self._readers = _open_readers(sources, read)
+        self._looking_ahead = [item for item in dict.fromkeys(self._readers) if not isinstance(item, LocalShards)]
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Cross to another process as settings; what is open stays here."""
@@ -68,9 +71,9 @@ class StepReader:
 
     def announce(self, plan: EpochPlan, step: int) -> None:
         """Tell the readers what a step will need, before it is read."""
-        rows = plan.rows(step, self._rank, self._world_size)
-        places = clip_places(self._sources, np.concatenate(rows))
-        for reader in dict.fromkeys(self._readers):
+        for reader in self._looking_ahead:
+            refs = np.concatenate(plan.rows(step, self._rank, self._world_size))
+            places = clip_places(self._sources, refs)
             reader.expect([span_of(place) for place in places if self._readers[place.source] is reader])
 
     def read(self, plan: EpochPlan, step: int) -> PackedBatch:
@@ -86,6 +89,7 @@ class StepReader:
             rows = plan.rows(step, self._rank, self._world_size)
             refs = np.concatenate(rows)
             clips = arrange(rows, clip_places(self._sources, refs), plan)
+            drawn = chunk_sizes(refs, plan.order, plan.epoch)
             layout = batch_layout(clips, len(rows), plan, self._latent_shape, self._dtype)
             packed = PackedBatch(
                 block=self._pool.take(layout.size_bytes),
@@ -95,13 +99,11 @@ class StepReader:
                 step=step,
                 seconds=watch.seconds,
             )
-        memory = memoryview(packed.block.numpy())
-        goals = np.empty((len(clips), 3), np.float32)
-        for number, clip in enumerate(clips):
-            goals[number] = self._read_clip(packed, memory, clip, watch)[:3]
+            memory = memoryview(packed.block.numpy())
+            targets = packed.tensors() if self._converts else {}
+        goals = [self._read_clip(layout, targets, memory, clip, watch) for clip in clips]
         with watch.measure(Part.COLLATE):
-            packed.tensor("refs").numpy()[:] = refs
-            describe(packed, clips, chunk_sizes(refs, plan.order, plan.epoch), goals)
+            describe(layout, memory, clips, refs=refs, chunk_size=drawn, goals=goals)
         return packed
 
     def close(self) -> None:
@@ -109,23 +111,29 @@ class StepReader:
         for reader in self._readers:
             reader.close()
 
-    def _read_clip(self, packed: PackedBatch, memory: memoryview, clip: ArrangedClip, watch: Stopwatch) -> np.ndarray:
-        """Read one clip into the batch; returns its last pose."""
+    def _read_clip(
+        self,
+        layout: BatchLayout,
+        targets: Mapping[str, torch.Tensor],
+        memory: memoryview,
+        clip: ArrangedClip,
+        watch: Stopwatch,
+    ) -> np.ndarray:
+        """Read one clip into the batch; returns the last camera position, float32 [3]."""
         place = clip.place
-        slots = slots_of(packed, memory, clip)
-        direct = self._dtype is _STORED and not self._standardise
-        staged = {} if direct else self._staged(clip)
+        slots = slots_of(layout, memory, clip)
+        staged = self._staged(clip) if self._converts else {}
         slots |= {name: memoryview(latents.numpy()).cast("B") for name, latents in staged.items()}
         due = self._verification.is_due(place.source, place.number)
         reader = self._readers[place.source]
         last_pose = read_clip(reader, place, self._latent_shape, list(slots.values()), checked=due, watch=watch)
         if due:
             self._verification.passed(place.source, place.number)
-        with watch.measure(Part.COLLATE):
-            for name, latents in staged.items():
-                out = packed.tensor(name)[clip.row, clip.start : clip.start + clip.latents]
+        for name, latents in staged.items():
+            with watch.measure(Part.COLLATE):
+                out = targets[name][clip.row, clip.start : clip.start + clip.latents]
                 convert(latents, out, self._standardise.get(name))
-        return last_pose
+        return last_pose[:3]
 
     def _staged(self, clip: ArrangedClip) -> dict[str, torch.Tensor]:
         """Memory of this thread for the stored latents of a clip; it stays in the cache from clip to clip."""
