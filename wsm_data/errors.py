@@ -92,6 +92,12 @@ class StoreError(WsmError):
     exit_code = 5
 
 
+class NumericalError(WsmError):
+    """A value that must be finite is not: training stops, and what was saved before stays as it is."""
+
+    exit_code = 6
+
+
 class DataError(WsmError):
     """This unit is unusable: it is quarantined under `reason`, and the run goes on.
 

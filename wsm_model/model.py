@@ -18,8 +18,9 @@ from wsm_model.mot.attention_blocks import PREDICTION, attend_by_blocks
 from wsm_model.mot.attention_flex import attend_flexibly, block_mask
 from wsm_model.mot.chunks import FrameTable
 from wsm_model.mot.expert import Stream
+from wsm_model.mot.layer import Attend
 from wsm_model.mot.mask import dense_mask
-from wsm_model.mot.transformer import Attend, MixtureOfTransformers
+from wsm_model.mot.transformer import MixtureOfTransformers
 
 FLOW_TIME_SCALE = 1000.0
 """Timesteps of Wan2.2 are flow times on the 0..1000 scale."""

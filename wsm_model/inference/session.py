@@ -81,8 +81,8 @@ class Session:
 
         Args:
             rgb: standardised RGB latent [B, C, h, w].
-            known: states to remember in place of the estimates, as in teacher forcing. Without SLAM nothing is estimated
-                here, and these are the poses issued before; the anchor's are the identity.
+            known: states to remember in place of the estimates, as in teacher forcing. Without SLAM nothing is
+                estimated, and these are the poses issued before; the anchor's are the identity.
 
         Returns:
             States of the current chunk up to this latent; of this latent alone without the local backend.

@@ -4,7 +4,6 @@ x_tau = (1 - tau) x + tau eps with tau in [0, 1] (1 is noise); the model predict
 uniformly and shifted towards noise; the error is weighted by a bell over tau.
 """
 
-import math
 from functools import cache
 
 import torch
@@ -44,26 +43,18 @@ def flow_weight(flow_time: Tensor, shift: float) -> Tensor:
     return (torch.exp(-2 * (flow_time - 0.5) ** 2) - lowest).clamp(min=0) * factor
 
 
-def flow_loss(velocity: Tensor, clean: Tensor, noise: Tensor, weight_BF: Tensor, counted_BF: Tensor) -> Tensor:
-    """Weighted squared error of the velocity eps - x.
-
-    The mean over the values of a frame, then over the frames that count (paper silent on the order).
+def flow_errors(velocity: Tensor, clean: Tensor, noise: Tensor, flow_time: Tensor, shift: float) -> Tensor:
+    """Weighted squared error of the velocity eps - x, as the mean over the values of each latent frame.
 
     Args:
         velocity: predictions [B, F, C, h, w].
         clean: x, the same shape.
         noise: eps, the same shape.
-        weight_BF: weight of each frame.
-        counted_BF: bool; padding and anchors do not count.
+        flow_time: tau of each frame, [B, F].
+        shift: gamma.
 
     Returns:
-        A scalar; 0 where no frame counts.
+        float32 [B, F].
     """
-    error = (velocity.float() - (noise - clean).float()).square().flatten(2).mean(-1)
-    return mean_where(error * weight_BF, counted_BF)
-
-
-def mean_where(values: Tensor, counted: Tensor) -> Tensor:
-    """Mean of the values that count, of the same shape; 0 where none does. What does not count may be anything."""
-    kept = torch.where(counted, values, torch.zeros((), device=values.device, dtype=values.dtype))
-    return kept.sum() / max(1, math.prod(counted.shape) if counted.all() else int(counted.sum()))
+    squared = (velocity.float() - (noise - clean).float()).square().flatten(2).mean(-1)
+    return squared * flow_weight(flow_time.float(), shift)

@@ -1,14 +1,15 @@
 """The pretraining objective (paper, equation 8): L_FM + lambda_d L_d + lambda_p (L_abs + L_rel)."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import torch
 from torch import Tensor
 
 from wsm_model.inputs import ModelInputs, ModelOutputs
-from wsm_model.losses.flow import flow_loss, flow_weight, mean_where
+from wsm_model.losses.flow import flow_errors
 from wsm_model.losses.pose import pose_losses, raw_frame_poses
+from wsm_model.mot.chunks import SequenceSpan
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,6 +30,21 @@ class LossConfig:
 
 
 @dataclass(frozen=True, kw_only=True)
+class LossCounts:
+    """What the means of a step are taken over; those of a whole step are the sums over its parts and ranks.
+
+    Attributes:
+        dreamed: latents that are dreamed: all but the anchors.
+        latents: latents.
+        sequences: sequences.
+    """
+
+    dreamed: float
+    latents: float
+    sequences: float
+
+
+@dataclass(frozen=True, kw_only=True)
 class LossReport:
     """Scalars with gradients.
 
@@ -41,36 +57,59 @@ class LossReport:
     parts: Mapping[str, Tensor]
 
 
-def pretraining_loss(inputs: ModelInputs, outputs: ModelOutputs, noise: Tensor, config: LossConfig) -> LossReport:
+def loss_counts(spans: Sequence[SequenceSpan]) -> LossCounts:
+    """Counts of some sequences."""
+    latents = sum(span.length for span in spans)
+    return LossCounts(dreamed=latents - len(spans), latents=latents, sequences=len(spans))
+
+
+def pretraining_loss(
+    inputs: ModelInputs,
+    outputs: ModelOutputs,
+    noise: Tensor,
+    config: LossConfig,
+    counts: LossCounts | None = None,
+) -> LossReport:
     """All parts of the objective.
+
+    The flow and depth parts are means over latents, the pose parts means over sequences of each one's mean over frames
+    and pairs.
 
     Args:
         inputs: the batch.
         outputs: what the model said of it.
         noise: eps that `inputs.noisy_rgb` was made with, [B, F, C, h, w].
         config: weights.
+        counts: what to divide by, where the batch is a part of a step; the parts of a step then add up to its losses.
     """
+    counts = counts or loss_counts(inputs.spans)
     table = inputs.table()
     device = outputs.velocity.device
-    real, dreamed = (table.sequence >= 0).to(device), ((table.sequence >= 0) & (table.latent > 0)).to(device)
-    weight = flow_weight(inputs.flow_time.float(), config.flow_shift)
-    parts = {"flow": flow_loss(outputs.velocity, inputs.rgb, noise, weight, dreamed)}
-    total = parts["flow"]
+    real, later = (table.sequence >= 0).to(device), (table.latent > 0).to(device)
+    errors = flow_errors(outputs.velocity, inputs.rgb, noise, inputs.flow_time, config.flow_shift)
+    parts = {"flow": _sum_where(errors, real & later) / max(1.0, counts.dreamed)}
     if outputs.depth is not None:
-        error = (outputs.depth.float() - inputs.depth.float()).square().flatten(2).mean(-1)
-        parts["depth"] = mean_where(error, real)
+        squared = (outputs.depth.float() - inputs.depth.float()).square().flatten(2).mean(-1)
+        parts["depth"] = _sum_where(squared, real) / counts.latents
+    parts |= _pose_parts(inputs, outputs, config, counts)
+    total = parts["flow"] + config.pose * (parts["pose_absolute"] + parts["pose_relative"])
+    if "depth" in parts:
         total = total + config.depth * parts["depth"]
-    parts |= _pose_parts(inputs, outputs, config)
-    total = total + config.pose * (parts["pose_absolute"] + parts["pose_relative"])
     return LossReport(total=total, parts=parts)
 
 
-def _pose_parts(inputs: ModelInputs, outputs: ModelOutputs, config: LossConfig) -> dict[str, Tensor]:
-    """Means over the sequences, each normalised by its own number of frames and pairs."""
+def _sum_where(values: Tensor, counted: Tensor) -> Tensor:
+    """Sum of the values that count; what does not count may be anything, even not finite."""
+    return torch.where(counted, values, torch.zeros((), device=values.device, dtype=values.dtype)).sum()
+
+
+def _pose_parts(
+    inputs: ModelInputs, outputs: ModelOutputs, config: LossConfig, counts: LossCounts
+) -> dict[str, Tensor]:
     found = []
     for span in inputs.spans:
         place = (span.row, slice(span.start, span.start + span.length))
         predicted, target = (raw_frame_poses(poses[place].float()) for poses in (outputs.poses, inputs.poses))
         found.append(pose_losses(predicted, target, config.pose_delta))
-    absolute, relative = (torch.stack(part).mean() for part in zip(*found, strict=True))
+    absolute, relative = (torch.stack(part).sum() / counts.sequences for part in zip(*found, strict=True))
     return {"pose_absolute": absolute, "pose_relative": relative}

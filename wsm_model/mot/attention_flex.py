@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from functools import cache
+from typing import cast
 
 import torch
 from torch import Tensor
@@ -37,7 +38,7 @@ def block_mask(config: ModelConfig, table: FrameTable, device: torch.device) -> 
 def attend_flexibly(tokens: JointTokens, mask: BlockMask) -> Attended:
     """Joint attention under a block mask; compiled on a GPU, interpreted elsewhere."""
     queries, keys, values = (flatten_tokens([part[i] for part in tokens.values()]) for i in range(3))
-    attend: Callable[..., Tensor] = _compiled() if queries.is_cuda else flex_attention
+    attend = _compiled() if queries.is_cuda else cast(Callable[..., Tensor], flex_attention)
     return unflatten_tokens(attend(queries, keys, values, block_mask=mask), tokens)
 
 

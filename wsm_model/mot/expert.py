@@ -1,11 +1,10 @@
-"""One expert: what turns its inputs into tokens, its layers, and the head that reads its predictions.
+"""The ends of one expert: what turns its inputs into tokens, and the head that reads its predictions.
 
 Shape suffixes: B batch, G copies of a frame (clean, prediction), F latent frames, P tokens of a frame, D width of the
 expert, C channels, h rows and w columns of a latent.
 """
 
 from dataclasses import dataclass, replace
-from typing import cast
 
 import torch
 from torch import Tensor, nn
@@ -16,7 +15,6 @@ from wsm_model.layers.patches import cut_patches, join_patches
 from wsm_model.layers.pose import PoseEmbedding, PoseHead
 from wsm_model.layers.rope import frame_positions, rotary_tables, token_offsets
 from wsm_model.layers.time_embedding import TimeEmbedding
-from wsm_model.mot.block import ExpertBlock
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,8 +78,8 @@ class PatchEmbedding(nn.Linear):
         return super().forward(cut_patches(latents, self.patch).to(self.weight.dtype))
 
 
-class ExpertTransformer(nn.Module):
-    """The parameters of one expert.
+class ExpertEnds(nn.Module):
+    """What an expert has before and after the layers.
 
     Args:
         config: the model.
@@ -95,7 +93,6 @@ class ExpertTransformer(nn.Module):
         is_pose = expert is Expert.POSE
         self.embedding = PoseEmbedding(width) if is_pose else PatchEmbedding(config, width)
         self.time = TimeEmbedding(config.time_frequencies, width)
-        self.blocks = nn.ModuleList(ExpertBlock(config, expert) for _ in range(config.layers))
         self.head = PoseHead(width, config.pose_hidden, config.norm_eps) if is_pose else LatentHead(config, width)
 
     def stream(self, values: Tensor, time: Tensor, latent_index: Tensor, prediction: int | None) -> Stream:
@@ -117,10 +114,6 @@ class ExpertTransformer(nn.Module):
             rope=rotary_tables(positions, self.config.head_width, self.config.rope_theta),
             prediction=prediction,
         )
-
-    def block(self, number: int) -> ExpertBlock:
-        """One layer."""
-        return cast(ExpertBlock, self.blocks[number])
 
     def read(self, stream: Stream) -> Tensor:
         """What the prediction copy says: latents [B, F, C, h, w] or poses [B, F, M, 7].

@@ -1,6 +1,6 @@
-"""The experts' layers side by side, with whatever attention joins them."""
+"""The three experts: their ends, and the layers they share."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import cast
 
 import torch
@@ -9,11 +9,8 @@ from torch.utils.checkpoint import checkpoint
 
 from wsm_model.config import Expert, ModelConfig
 from wsm_model.layers.goal import GoalEmbedding
-from wsm_model.mot.attention import Attended, JointTokens
-from wsm_model.mot.expert import ExpertTransformer, Stream
-
-Attend = Callable[[int, JointTokens], Attended]
-"""Joint attention of a layer: its number and the tokens of every expert to what they gather."""
+from wsm_model.mot.expert import ExpertEnds, Stream
+from wsm_model.mot.layer import Attend, JointLayer
 
 Streams = Mapping[Expert, Stream]
 
@@ -23,18 +20,22 @@ class MixtureOfTransformers(nn.Module):
 
     Args:
         config: the model.
+
+    Attributes:
+        checkpoint_activations: recompute each layer in the backward pass instead of keeping what is inside it.
     """
 
     def __init__(self, config: ModelConfig):
         super().__init__()
         self.config = config
-        self.experts = nn.ModuleDict({expert.value: ExpertTransformer(config, expert) for expert in config.experts})
+        self.experts = nn.ModuleDict({expert.value: ExpertEnds(config, expert) for expert in config.experts})
+        self.layers = nn.ModuleList(JointLayer(config, number) for number in range(config.layers))
         self.goal = GoalEmbedding(config.goal_frequencies, config.goal_base_rad_per_m, config.generation.width)
         self.checkpoint_activations = False
 
-    def expert(self, expert: Expert) -> ExpertTransformer:
-        """One expert."""
-        return cast(ExpertTransformer, self.experts[expert.value])
+    def expert(self, expert: Expert) -> ExpertEnds:
+        """The ends of one expert."""
+        return cast(ExpertEnds, self.experts[expert.value])
 
     def run(self, streams: Streams, attend: Attend, context: Tensor | None) -> dict[Expert, Stream]:
         """All layers.
@@ -45,25 +46,16 @@ class MixtureOfTransformers(nn.Module):
             context: goal tokens of each frame, [B, F, S, D of the generation expert].
         """
         tokens = {expert: stream.x for expert, stream in streams.items()}
-        for number in range(self.config.layers):
+        for layer in self.layers:
             if self.checkpoint_activations and torch.is_grad_enabled():
-                tokens = checkpoint(self._layer, number, tokens, streams, attend, context, use_reentrant=False)
+                tokens = checkpoint(layer, tokens, streams, attend, context, use_reentrant=False)
             else:
-                tokens = self._layer(number, tokens, streams, attend, context)
+                tokens = layer(tokens, streams, attend, context)
         return {expert: stream.with_tokens(tokens[expert]) for expert, stream in streams.items()}
 
-    def _layer(
-        self, number: int, tokens: dict[Expert, Tensor], streams: Streams, attend: Attend, context: Tensor | None
-    ) -> dict[Expert, Tensor]:
-        blocks = {expert: self.expert(expert).block(number) for expert in streams}
-        asked = {
-            expert: blocks[expert].before_attention(tokens[expert], stream.modulation, stream.rope)
-            for expert, stream in streams.items()
-        }
-        gathered = attend(number, asked)
-        return {
-            expert: blocks[expert].after_attention(
-                tokens[expert], gathered[expert], stream.modulation, context, stream.prediction
-            )
-            for expert, stream in streams.items()
-        }
+
+def expert_of_parameter(name: str) -> Expert | None:
+    """The expert whose parameter has this name in a state dict; None for the goal embedding."""
+    words = name.split(".")
+    place = {"experts": 1, "layers": 3}.get(words[0])
+    return None if place is None else Expert(words[place])

@@ -16,7 +16,7 @@ from torch import Tensor, nn
 from wsm_data.errors import ConfigError
 from wsm_model.config import Expert
 from wsm_model.layers.time_embedding import MODULATIONS
-from wsm_model.mot.transformer import MixtureOfTransformers
+from wsm_model.mot.transformer import MixtureOfTransformers, expert_of_parameter
 from wsm_model.weights.interpolation import resize_tensor
 from wsm_model.weights.wan_names import is_unused, our_name
 
@@ -84,7 +84,7 @@ def load_wan_weights(model: MixtureOfTransformers, folder: str | Path) -> Weight
 
 
 def _targets(parameters: Mapping[str, nn.Parameter], inner: str) -> list[str]:
-    names = [f"experts.{expert.value}.{inner}" for expert in Expert]
+    names = [inner.format(expert=expert.value) for expert in Expert]
     return [name for name in names if name in parameters and not _is_pose_interface(name)]
 
 
@@ -95,7 +95,7 @@ def _is_pose_interface(name: str) -> bool:
 
 def _as_ours(tensor: Tensor, inner: str) -> Tensor:
     """The same numbers in our shape: patch kernels [D, C, 1, p, p] as matrices, tables without their leading 1."""
-    if inner == "embedding.weight":
+    if inner.endswith(".embedding.weight"):
         return tensor.flatten(1)
     return tensor.squeeze(0) if inner.endswith("table") else tensor
 
@@ -114,7 +114,7 @@ def _write(parameter: nn.Parameter, source: Tensor, name: str) -> None:
 
 
 def _require_width_of_state_expert(target: str, source: Tensor, parameter: nn.Parameter, name: str) -> None:
-    if target.startswith(f"experts.{Expert.GENERATION.value}."):
+    if expert_of_parameter(target) is Expert.GENERATION:
         raise ConfigError(
             f"the generation expert takes Wan2.2's weights as they are: {name} must have the shape "
             f"{_shape(parameter)}, found {_shape(source)}; choose the model size of the weights"
@@ -122,8 +122,8 @@ def _require_width_of_state_expert(target: str, source: Tensor, parameter: nn.Pa
 
 
 def _require_whole(parameters: Mapping[str, nn.Parameter], filled: set[str], folder: Path) -> None:
-    lead = f"experts.{Expert.GENERATION.value}."
-    missing = sorted(name for name in parameters if name.startswith(lead) and name not in filled)
+    own = {name for name in parameters if expert_of_parameter(name) is Expert.GENERATION}
+    missing = sorted(own - filled)
     if missing:
         raise ConfigError(
             f"{folder} must hold every tensor of Wan2.2's transformer, but there is none for {missing[0]}"

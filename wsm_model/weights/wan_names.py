@@ -58,9 +58,10 @@ def is_unused(name: str) -> bool:
 
 
 def our_name(name: str) -> str | None:
-    """Name of a tensor within an `ExpertTransformer`; None where it is not one of Wan2.2's."""
+    """Name of a tensor in our state dict, with `{expert}` for the expert; None where it is not one of Wan2.2's."""
     block = _BLOCK.fullmatch(name)
-    words, table, lead = (block[2], _IN_BLOCK, f"blocks.{block[1]}.") if block else (name, _OUTER, "")
+    words, table = (block[2], _IN_BLOCK) if block else (name, _OUTER)
+    lead = f"layers.{block[1]}.experts.{{expert}}." if block else "experts.{expert}."
     stem, suffix = _split(words)
     return f"{lead}{table[stem]}{suffix}" if stem in table else None
 

@@ -1,0 +1,139 @@
+"""Checkpoints of a run: parameters and moments in safetensors, sharded over the ranks, and a small JSON beside them.
+
+A checkpoint is a folder `step-000500`. Its `state.json` is written last: a folder without it is unfinished and is passed
+over. It says the step, the state of the loader and what the tensors must fit, so a run goes on exactly where it was, on
+as many ranks as are there now. Nothing is pickled.
+"""
+
+import json
+import re
+import shutil
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import torch
+import torch.distributed.checkpoint as dcp
+from torch import Tensor, nn
+from torch.distributed.checkpoint import HuggingFaceStorageReader, HuggingFaceStorageWriter
+
+from wsm_data.errors import ConfigError, IntegrityError
+from wsm_data.files.atomic import write_text
+from wsm_data.files.jsonlines import canonical_json
+from wsm_model.training.ranks import rank_and_world_size, wait_for_all
+
+_STATE = "state.json"
+_FOLDER = re.compile(r"step-(\d{6,})")
+_MOMENTS = ("exp_avg", "exp_avg_sq")
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainingState:
+    """Where a run stands.
+
+    Attributes:
+        step: optimiser steps done.
+        loader: state of the loader, as it wrote it.
+        identity: what the run is made from: model, settings, release; another run's checkpoints are refused by it.
+    """
+
+    step: int
+    loader: Mapping[str, object]
+    identity: Mapping[str, object]
+
+
+def save_checkpoint(folder: Path, model: nn.Module, optimiser: torch.optim.Optimizer, state: TrainingState) -> Path:
+    """Write a checkpoint; every rank writes its own part, and the last act is one rank's `state.json`.
+
+    Returns:
+        The folder of this step.
+    """
+    rank, world_size = rank_and_world_size()
+    path = folder / f"step-{state.step:06d}"
+    if rank == 0:
+        shutil.rmtree(path, ignore_errors=True)  # what a killed run left
+        path.mkdir(parents=True)
+    wait_for_all()
+    writer = HuggingFaceStorageWriter(str(path), save_distributed=True)
+    dcp.save(_tensors(model, optimiser), storage_writer=writer, no_dist=world_size == 1)
+    wait_for_all()
+    if rank == 0:
+        record = {"step": state.step, "loader": dict(state.loader), "identity": dict(state.identity)}
+        write_text(path / _STATE, canonical_json(record) + "\n")
+    wait_for_all()
+    return path
+
+
+def load_checkpoint(
+    path: Path, model: nn.Module, optimiser: torch.optim.Optimizer, identity: Mapping[str, object]
+) -> TrainingState:
+    """Fill model and optimiser in place; returns where the run stood.
+
+    Raises:
+        ConfigError: the checkpoint is of another model, settings or release; says in which fields.
+        IntegrityError: it is damaged.
+    """
+    state = read_state(path)
+    _require_same(path, dict(state.identity), dict(identity))
+    _prepare_moments(model, optimiser, state.step)
+    _, world_size = rank_and_world_size()
+    try:
+        reader = HuggingFaceStorageReader(str(path))
+        dcp.load(_tensors(model, optimiser), storage_reader=reader, no_dist=world_size == 1)
+    except (OSError, RuntimeError, KeyError, ValueError, dcp.api.CheckpointException) as error:
+        raise IntegrityError(
+            f"{path} must be a whole checkpoint, but: {error}; delete it to go on from the one before"
+        ) from error
+    return state
+
+
+def read_state(path: Path) -> TrainingState:
+    """The JSON of a checkpoint.
+
+    Raises:
+        IntegrityError: it is not what `save_checkpoint` writes.
+    """
+    try:
+        record = json.loads((path / _STATE).read_text())
+        return TrainingState(step=int(record["step"]), loader=record["loader"], identity=record["identity"])
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise IntegrityError(f"{path / _STATE} must be the state of a checkpoint, but: {error}") from error
+
+
+def checkpoints(folder: Path) -> list[Path]:
+    """Finished checkpoints of a run, oldest first."""
+    found = [(int(match[1]), path) for path in folder.glob("step-*") if (match := _FOLDER.fullmatch(path.name))]
+    return [path for _, path in sorted(found) if (path / _STATE).is_file()]
+
+
+def drop_old_checkpoints(folder: Path, keep: int) -> None:
+    """Delete all but the latest; what marks a checkpoint as finished goes first."""
+    for path in checkpoints(folder)[:-keep]:
+        (path / _STATE).unlink()
+        shutil.rmtree(path)
+
+
+def _tensors(model: nn.Module, optimiser: torch.optim.Optimizer) -> dict[str, Tensor]:
+    tensors: dict[str, Tensor] = {}
+    for name, parameter in model.named_parameters():
+        tensors[f"model.{name}"] = parameter.detach()
+        for moment in _MOMENTS:
+            if moment in optimiser.state[parameter]:
+                tensors[f"optimiser.{moment}.{name}"] = optimiser.state[parameter][moment]
+    return tensors
+
+
+def _prepare_moments(model: nn.Module, optimiser: torch.optim.Optimizer, step: int) -> None:
+    """Give the optimiser the state it has after `step` steps, for the moments to be read into."""
+    for parameter in model.parameters():
+        moments = {moment: torch.zeros_like(parameter) for moment in _MOMENTS}
+        optimiser.state[parameter] = {"step": torch.tensor(float(step)), **moments} if step else {}
+
+
+def _require_same(path: Path, found: dict[str, object], wanted: dict[str, object]) -> None:
+    other = sorted(name for name in found.keys() | wanted.keys() if found.get(name) != wanted.get(name))
+    if other:
+        lines = [f"  {name}: {found.get(name)!r} in the checkpoint, {wanted.get(name)!r} now" for name in other]
+        raise ConfigError(
+            "\n".join([f"{path} belongs to another run; give another --out, or the same settings:", *lines])
+        )

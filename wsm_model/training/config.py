@@ -1,0 +1,90 @@
+"""Settings of pretraining; the defaults are those of the paper's table "Pretraining hyperparameters"."""
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from wsm_model.losses.total import LossConfig
+
+
+class Precision(StrEnum):
+    """Arithmetic of the matrix products; norms, modulation, residual sums and losses are float32 in either."""
+
+    BFLOAT16 = "bfloat16"
+    FLOAT32 = "float32"
+
+
+@dataclass(frozen=True, kw_only=True)
+class OptimiserConfig:
+    """AdamW with a linear warm-up and a cosine decay.
+
+    Attributes:
+        learning_rate: peak of the base learning rate.
+        final_learning_rate: its value after the last step.
+        generation_factor: what the generation expert and the goal embedding multiply it by.
+        warmup_share: share of the steps in which it rises.
+        beta_1: decay of the first moment.
+        beta_2: decay of the second moment.
+        eps: added to the root of the second moment.
+        weight_decay: decoupled, of all parameters.
+        clip_norm: largest norm of the gradient of all parameters.
+    """
+
+    learning_rate: float = 3e-5
+    final_learning_rate: float = 3e-6
+    generation_factor: float = 0.3
+    warmup_share: float = 0.05
+    beta_1: float = 0.9
+    beta_2: float = 0.95
+    eps: float = 1e-8
+    weight_decay: float = 0.01
+    clip_norm: float = 2.0
+
+    def __post_init__(self) -> None:
+        if not 0 < self.final_learning_rate <= self.learning_rate:
+            raise ValueError(
+                f"final_learning_rate must lie in (0, learning_rate = {self.learning_rate}], found "
+                f"{self.final_learning_rate}"
+            )
+        if not 0 <= self.warmup_share < 1:
+            raise ValueError(f"warmup_share must lie in [0, 1), found {self.warmup_share}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainingConfig:
+    """How a model is trained.
+
+    Attributes:
+        epochs: passes over the data.
+        max_steps: end after this many optimiser steps; 0: after `epochs`. The schedule ends where training ends.
+        micro_rows: rows of a rank's step that are passed at once; gradients of the parts are accumulated. 0: all.
+        seed: of initial weights, noise and flow times.
+        precision: arithmetic of matrix products.
+        checkpoint_activations: recompute each layer in the backward pass instead of keeping what is inside it.
+        optimiser: learning rate and moments.
+        loss: weights of the parts.
+        checkpoint_every: optimiser steps between checkpoints; there is one at the end in any case.
+        keep_checkpoints: how many of the latest stay on disk.
+        log_every: optimiser steps between lines of metrics.
+        sample_every: optimiser steps between pictures; 0: none.
+    """
+
+    epochs: int = 10
+    max_steps: int = 0
+    micro_rows: int = 0
+    seed: int = 0
+    precision: Precision = Precision.BFLOAT16
+    checkpoint_activations: bool = False
+    optimiser: OptimiserConfig = field(default_factory=OptimiserConfig)
+    loss: LossConfig = field(default_factory=LossConfig)
+    checkpoint_every: int = 500
+    keep_checkpoints: int = 2
+    log_every: int = 1
+    sample_every: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("epochs", "checkpoint_every", "keep_checkpoints", "log_every"):
+            if getattr(self, name) < 1:
+                raise ValueError(f"{name} must be at least 1, found {getattr(self, name)}")
+        for name in ("max_steps", "micro_rows", "sample_every", "seed"):
+            if getattr(self, name) < 0:
+                raise ValueError(f"{name} must not be negative, found {getattr(self, name)}")

@@ -1,0 +1,68 @@
+"""One process or many: sharding of the parameters, and sums over the ranks.
+
+With several processes every layer is sharded with FSDP2; alone, the model is left as it is.
+"""
+
+import os
+from collections.abc import Iterable
+
+import torch
+import torch.distributed as dist
+from torch import Tensor
+from torch.distributed.device_mesh import init_device_mesh
+from torch.distributed.fsdp import fully_shard
+
+from wsm_model.mot.transformer import MixtureOfTransformers
+
+
+def start_ranks() -> torch.device:
+    """Join the processes that torchrun started, if it did, and return this one's device."""
+    local = int(os.environ.get("LOCAL_RANK", "0"))
+    device = torch.device("cuda", local) if torch.cuda.is_available() else torch.device("cpu")
+    if "RANK" in os.environ and not dist.is_initialized():
+        if device.type == "cuda":
+            torch.cuda.set_device(device)
+        dist.init_process_group("nccl" if device.type == "cuda" else "gloo")
+    return device
+
+
+def rank_and_world_size() -> tuple[int, int]:
+    """This process's number and how many there are; 0 and 1 alone."""
+    return (dist.get_rank(), dist.get_world_size()) if dist.is_initialized() else (0, 1)
+
+
+def shard_model(model: MixtureOfTransformers, device: torch.device) -> None:
+    """Shard every layer, and what is left, over all ranks; nothing to do in a process that is alone."""
+    _, world_size = rank_and_world_size()
+    if world_size == 1:
+        return
+    mesh = init_device_mesh(device.type, (world_size,))
+    for layer in model.layers:
+        fully_shard(layer, mesh=mesh)
+    fully_shard(model, mesh=mesh)
+
+
+def sum_over_ranks(values: Iterable[float], device: torch.device) -> list[float]:
+    """Sums over all ranks, in float64."""
+    total = torch.tensor(list(values), dtype=torch.float64, device=device)
+    if dist.is_initialized():
+        dist.all_reduce(total)
+    return [float(value) for value in total.tolist()]
+
+
+def whole(tensor: Tensor) -> Tensor:
+    """A tensor with the parts of all ranks."""
+    full = getattr(tensor, "full_tensor", None)
+    return tensor if full is None else full()
+
+
+def wait_for_all() -> None:
+    """Return when every rank has come here."""
+    if dist.is_initialized():
+        dist.barrier()
+
+
+def leave_ranks() -> None:
+    """End this process's part."""
+    if dist.is_initialized():
+        dist.destroy_process_group()

@@ -1,0 +1,49 @@
+"""Learning rate as a pure function of the step, and the parameter groups it applies to (paper, appendix B.1)."""
+
+import math
+from typing import Any
+
+import torch
+from torch import nn
+
+from wsm_model.config import Expert
+from wsm_model.mot.transformer import expert_of_parameter
+from wsm_model.training.config import OptimiserConfig
+
+_FACTOR = "learning_rate_factor"
+
+
+def learning_rate(step: int, steps: int, config: OptimiserConfig) -> float:
+    """Base rate of optimiser step `step` (from 0) of `steps`: linear warm-up, then a cosine to the final rate."""
+    warmup = math.ceil(config.warmup_share * steps)
+    if step < warmup:
+        return config.learning_rate * (step + 1) / warmup
+    progress = (step - warmup) / max(1, steps - 1 - warmup)
+    cosine = 0.5 * (1 + math.cos(math.pi * min(1.0, progress)))
+    return config.final_learning_rate + (config.learning_rate - config.final_learning_rate) * cosine
+
+
+def make_optimiser(model: nn.Module, config: OptimiserConfig) -> torch.optim.AdamW:
+    """AdamW with two groups: generation expert and goal embedding, and everything else."""
+    slower: list[nn.Parameter] = []
+    others: list[nn.Parameter] = []
+    for name, parameter in model.named_parameters():
+        is_slower = expert_of_parameter(name) in (Expert.GENERATION, None)
+        (slower if is_slower else others).append(parameter)
+    groups: list[dict[str, Any]] = [
+        {"params": slower, _FACTOR: config.generation_factor},
+        {"params": others, _FACTOR: 1.0},
+    ]
+    return torch.optim.AdamW(
+        groups,
+        lr=config.learning_rate,
+        betas=(config.beta_1, config.beta_2),
+        eps=config.eps,
+        weight_decay=config.weight_decay,
+    )
+
+
+def set_learning_rate(optimiser: torch.optim.Optimizer, rate: float) -> None:
+    """Give every group its multiple of the base rate."""
+    for group in optimiser.param_groups:
+        group["lr"] = rate * group[_FACTOR]
