@@ -62,13 +62,15 @@ def bucket_lanes(slots: Int64Array, lengths: NDArray[np.integer], order: OrderCo
     """
     steps = np.arange(slots.shape[1])
     pools = steps // order.pool
-    step_of_pool = steps % order.pool
-    bits = int(order.pool - 1).bit_length()
-    keys = (pools << 32) + lengths[slots]
+    bits = (order.pool - 1).bit_length()
+    keys = lengths[slots].astype(np.int64)
     keys <<= bits
-    keys |= step_of_pool  # equal lengths stay in the order in which they came
-    keys.sort(axis=1)
-    chosen = pools * order.pool + (keys & ((1 << bits) - 1))
+    keys |= steps % order.pool  # equal lengths stay in the order in which they came
+    for first in range(0, len(steps), order.pool):
+        keys[:, first : first + order.pool].sort(axis=1)
+    chosen = keys & ((1 << bits) - 1)
+    chosen += pools * order.pool
     if order.shuffle:
-        chosen = chosen[:, permutation(mix64(steps, order.seed, Draw.STEPS, epoch), pools)]
+        pool_sizes = np.bincount(pools)
+        chosen = chosen[:, permutation(mix64(steps, order.seed, Draw.STEPS, epoch), pool_sizes)]
     return np.take_along_axis(slots, chosen, axis=1)

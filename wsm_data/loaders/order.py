@@ -51,14 +51,14 @@ def pass_order(shard_clips: Int64Array, order: OrderConfig, *, source: int, numb
         int64 [clips].
     """
     clips = int(shard_clips.sum())
-    if not order.shuffle:
+    if not order.shuffle or not clips:
         return np.arange(clips)
-    block_clips = _blocks(shard_clips, order.block_clips)
-    permuted = permutation(mix64(np.arange(len(block_clips)), order.seed, Draw.BLOCKS, source, number))
-    window_of_block = np.empty(len(block_clips), np.int64)
-    window_of_block[permuted] = np.arange(len(block_clips)) // order.window_blocks
-    hashes = mix64(np.arange(clips), order.seed, Draw.CLIPS, source, number)
-    return permutation(hashes, np.repeat(window_of_block, block_clips))
+    sizes = _blocks(shard_clips, order.block_clips)
+    permuted = permutation(mix64(np.arange(len(sizes)), order.seed, Draw.BLOCKS, source, number))
+    in_blocks = _joined((np.cumsum(sizes) - sizes)[permuted], sizes[permuted])
+    windows = np.add.reduceat(sizes[permuted], np.arange(0, len(sizes), order.window_blocks))
+    hashes = mix64(in_blocks, order.seed, Draw.CLIPS, source, number)
+    return in_blocks[permutation(hashes, windows)]
 
 
 def _blocks(shard_clips: Int64Array, block_clips: int) -> Int64Array:
@@ -69,3 +69,9 @@ def _blocks(shard_clips: Int64Array, block_clips: int) -> Int64Array:
     sizes = np.full(int(blocks.sum()), block_clips, np.int64)
     sizes[np.cumsum(blocks) - 1] = shard_clips - (blocks - 1) * block_clips
     return sizes
+
+
+def _joined(starts: Int64Array, sizes: Int64Array) -> Int64Array:
+    """The numbers of all stretches, one stretch after the other."""
+    shifts = starts - (np.cumsum(sizes) - sizes)
+    return np.repeat(shifts, sizes) + np.arange(int(sizes.sum()))
