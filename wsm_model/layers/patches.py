@@ -26,4 +26,5 @@ def join_patches(vectors: Tensor, patch: int, rows: int) -> Tensor:
     x = vectors.unflatten(-1, (patch, patch, -1)).unflatten(-4, (rows, -1))  # ..., rows, columns, patch, patch, C
     lead = x.dim() - 5
     order = [*range(lead), lead + 4, lead, lead + 2, lead + 1, lead + 3]
-    return x.permute(order).flatten(-2).flatten(-3, -2)
+    sides = (rows * patch, x.shape[-4] * patch)
+    return x.permute(order).reshape(*x.shape[:-5], x.shape[-1], *sides)

@@ -1,8 +1,8 @@
 """Checkpoints of a run: parameters and moments in safetensors, sharded over the ranks, and a small JSON beside them.
 
-A checkpoint is a folder `step-000500`. Its `state.json` is written last: a folder without it is unfinished and is passed
-over. It says the step, the state of the loader and what the tensors must fit, so a run goes on exactly where it was, on
-as many ranks as are there now. Nothing is pickled.
+A checkpoint is a folder `step-000500`. Its `state.json` is written last: a folder without it is unfinished and is
+passed over. It says the step, the state of the loader and what the tensors must fit, so a run goes on exactly where it
+was, on as many ranks as are there now. Nothing is pickled.
 """
 
 import json
@@ -13,9 +13,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import torch
-import torch.distributed.checkpoint as dcp
 from torch import Tensor, nn
-from torch.distributed.checkpoint import HuggingFaceStorageReader, HuggingFaceStorageWriter
+from torch.distributed.checkpoint.api import CheckpointException
+from torch.distributed.checkpoint.hf_storage import HuggingFaceStorageReader, HuggingFaceStorageWriter
+from torch.distributed.checkpoint.state_dict_loader import load
+from torch.distributed.checkpoint.state_dict_saver import save
 
 from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.files.atomic import write_text
@@ -55,7 +57,7 @@ def save_checkpoint(folder: Path, model: nn.Module, optimiser: torch.optim.Optim
         path.mkdir(parents=True)
     wait_for_all()
     writer = HuggingFaceStorageWriter(str(path), save_distributed=True)
-    dcp.save(_tensors(model, optimiser), storage_writer=writer, no_dist=world_size == 1)
+    save(_tensors(model, optimiser), storage_writer=writer, no_dist=world_size == 1)
     wait_for_all()
     if rank == 0:
         record = {"step": state.step, "loader": dict(state.loader), "identity": dict(state.identity)}
@@ -79,8 +81,8 @@ def load_checkpoint(
     _, world_size = rank_and_world_size()
     try:
         reader = HuggingFaceStorageReader(str(path))
-        dcp.load(_tensors(model, optimiser), storage_reader=reader, no_dist=world_size == 1)
-    except (OSError, RuntimeError, KeyError, ValueError, dcp.api.CheckpointException) as error:
+        load(_tensors(model, optimiser), storage_reader=reader, no_dist=world_size == 1)
+    except (OSError, RuntimeError, KeyError, ValueError, CheckpointException) as error:
         raise IntegrityError(
             f"{path} must be a whole checkpoint, but: {error}; delete it to go on from the one before"
         ) from error

@@ -43,4 +43,4 @@ def _board(folder: Path, done: int) -> Any:
     """The event writer; `purge_step` hides what a killed run wrote."""
     from torch.utils.tensorboard import SummaryWriter
 
-    return SummaryWriter(str(folder / "tensorboard"), purge_step=done + 1)  # type: ignore[no-untyped-call]
+    return SummaryWriter(str(folder / "tensorboard"), purge_step=done + 1)

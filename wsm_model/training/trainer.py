@@ -192,7 +192,7 @@ def _backward(
     with _precision(config.precision, part.noise.device):
         outputs = model(part.inputs)
     report = pretraining_loss(part.inputs, outputs, part.noise, config.loss, counts)
-    (report.total * world_size).backward()  # type: ignore[no-untyped-call]  # gradients are averaged over the ranks
+    (report.total * world_size).backward()  # gradients are averaged over the ranks
     names = ["loss", *report.parts]
     values = torch.stack([report.total.detach(), *(value.detach() for value in report.parts.values())]).tolist()
     return dict(zip(names, values, strict=True))
