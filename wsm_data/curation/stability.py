@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import pyarrow as pa
@@ -59,15 +60,10 @@ def bootstrap_overlap(
     split = np.flatnonzero(np.asarray(index["split"].to_numpy() == config.split))
     overlaps, unmet = [], 0
     for sample in range(samples):
-        raw = np.random.Philox(key=[seed, sample]).random_raw(len(split))  # raw bits are the same in every numpy
-        drawn = np.sort(split[np.unique(raw % np.uint64(len(split))).astype(np.int64)])
+        drawn = _drawn(split, seed, sample)
+        of_drawn = partial(_paths_of, read_paths, drawn)
         try:
-            again = select_clips(
-                index.take(pa.array(drawn)),
-                _rows(scores, drawn),
-                lambda rows, drawn=drawn: read_paths(drawn[rows]),
-                config,
-            )
+            again = select_clips(index.take(pa.array(drawn)), _rows(scores, drawn), of_drawn, config)
         except ConfigError:
             unmet += 1
             continue
@@ -78,3 +74,15 @@ def bootstrap_overlap(
 def _rows(scores: ScoreTable, rows: NDArray[np.int64]) -> ScoreTable:
     columns = {name: values[rows] for name, values in scores.columns.items()}
     return replace(scores, keys=scores.keys.take(pa.array(rows)), columns=columns)
+
+
+def _drawn(rows: NDArray[np.int64], seed: int, sample: int) -> NDArray[np.int64]:
+    """The rows that a bootstrap sample holds, ascending; from raw bits, which are the same in every numpy."""
+    raw = np.random.Philox(key=[seed, sample]).random_raw(len(rows))
+    return rows[np.unique(raw % np.uint64(len(rows))).astype(np.int64)]
+
+
+def _paths_of(
+    read_paths: Callable[[NDArray[np.int64]], Float32Array], rows: NDArray[np.int64], numbers: NDArray[np.int64]
+) -> Float32Array:
+    return read_paths(rows[numbers])

@@ -30,11 +30,10 @@ def compared_histogram(everything: Float64Array, chosen: Float64Array, label: st
     all_shares, chosen_shares = (_shares(values, edges) for values in (everything, chosen))
     axes.stairs(all_shares, edges, fill=True, color=BAR, alpha=0.55, lw=0)
     axes.stairs(chosen_shares, edges, color=BAR_SECOND, lw=2.2)
-    beyond = float((everything > edges[-1]).mean())
-    if beyond:
-        axes.set_title(
-            f"{100 * beyond:.2g} % of clips lie beyond", loc="right", fontsize=9, fontweight="normal", color=MUTED
-        )
+    beyond = [100 * float((values > edges[-1]).mean()) for values in (everything, chosen) if len(values)]
+    if any(beyond):
+        text = f"beyond: {' % of all, '.join(f'{share:.2g}' for share in beyond)} % of chosen"
+        axes.set_title(text, loc="right", fontsize=9, fontweight="normal", color=MUTED)
     axes.set(xlabel=label, ylabel="share of clips", xlim=(edges[0], edges[-1]))
     axes.xaxis.set_major_locator(MaxNLocator(nbins=5))
     if share:
@@ -72,7 +71,7 @@ def leading_chart(labels: Sequence[str], counts: Sequence[int]) -> Figure:
 
 def shared_edges(values: Float64Array) -> Float64Array:
     """Edges of 24 bins from the least value to that below which 99.5 % lie; wider where that is a single one."""
-    low, high = float(values.min()), float(np.quantile(values, _TAIL))
+    low, high = float(values.min()), float(np.quantile(values, _TAIL, method="higher"))
     if high <= low:
         high = float(values.max())
     if high <= low:

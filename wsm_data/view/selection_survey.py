@@ -41,7 +41,7 @@ class SelectionSurveyConfig:
 
     hardest: int = 5
     borderline: int = 2
-    pictures: int = 4
+    pictures: int = 6
     listed: int = 100
     samples: int = 20
 
