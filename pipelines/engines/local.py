@@ -7,9 +7,9 @@ import threading
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from multiprocessing import forkserver, resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
-from multiprocessing.resource_tracker import ensure_running
 from typing import Any, TypeVar
 
 from pipelines.engines.task import limit_threads, results_of, unless_failed
@@ -19,6 +19,9 @@ TaskT = TypeVar("TaskT")
 ResultT = TypeVar("ResultT")
 
 _DEATH_WAIT_S = 5.0
+
+_LOADED_BY_THE_SERVER = ["pipelines.warm_start"]
+"""By name: this module knows no stage. A module that cannot be imported there is left out."""
 
 
 @dataclass(frozen=True)
@@ -31,9 +34,10 @@ def run_local(
 ) -> Generator[ResultT, None, None]:
     """Apply `work` to every task and yield its results as they come, in no particular order across tasks.
 
-    With one worker everything happens in this process. More are started afresh (`spawn`): nothing is inherited from
-    threads or libraries of this one, so results cannot depend on what it did before. Workers end when the generator
-    is closed, and when this process ends, even if it is killed.
+    With one worker everything happens in this process. More are forked from a server process that is started once, and
+    does nothing but load what all of them need: so a stage's workers are there at once, and nothing is inherited from
+    threads or libraries of this process, so results cannot depend on what it did before. Workers end when the generator
+    is closed, and when this process ends, even if it is killed; the server ends with it.
 
     Args:
         tasks: must pickle, as must `work` and its results, when workers > 1.
@@ -85,16 +89,18 @@ def _run_pool(tasks: Sequence[Any], work: Callable[[Any], Iterator[Any]], worker
 @contextmanager
 def _interrupts_held_back() -> Iterator[None]:
     """Ctrl-C is this process's to handle: workers inherit that it is blocked, here it is delivered at the end."""
-    ensure_running()  # what the first start of a process would do otherwise, and it unblocks Ctrl-C again
+    resource_tracker.ensure_running()  # what the start of the server would do otherwise, and it unblocks Ctrl-C again
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
+        forkserver.set_forkserver_preload(_LOADED_BY_THE_SERVER)
+        forkserver.ensure_running()
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _start(work: Callable[[Any], Iterator[Any]]) -> tuple[Connection, BaseProcess]:
-    context = multiprocessing.get_context("spawn")
+    context = multiprocessing.get_context("forkserver")
     ours, theirs = context.Pipe()
     process = context.Process(target=_worker, args=(work, theirs), daemon=True)
     process.start()

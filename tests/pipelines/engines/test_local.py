@@ -8,7 +8,7 @@ import sys
 import time
 
 import pytest
-from fake_tasks import die, fail, fail_to_pickle, numbers_below, process_id, refuse, zeros
+from fake_tasks import die, fail, loaded_modules, numbers_below, parent_process_id, process_id, refuse, zeros
 
 from pipelines.engines.local import run_local
 from wsm_data.errors import DataError, Reason, WsmError
@@ -52,10 +52,32 @@ def test_a_worker_that_dies_is_told_with_its_exit_code():
         list(run_local([1, 2], die, 2))
 
 
-def test_a_result_that_does_not_pickle_is_told_and_not_lost(capfd):
-    with pytest.raises(WsmError, match=r"a worker process died \(exit code 1;"):
-        list(run_local([1, 2], fail_to_pickle, 2))
-    assert "pickle" in capfd.readouterr().err
+FAILING_PARENT = """
+from fake_tasks import fail_to_pickle
+from pipelines.engines.local import run_local
+if __name__ == "__main__":
+    list(run_local([1, 2], fail_to_pickle, 2))
+"""
+
+
+def test_a_result_that_does_not_pickle_is_told_and_not_lost(tmp_path, fakes_on_path):
+    """In a program of its own: workers write to what was the standard error when their server was started."""
+    program = tmp_path / "program.py"
+    program.write_text(FAILING_PARENT)
+    done = subprocess.run([sys.executable, program], env=fakes_on_path, capture_output=True, text=True, timeout=120)
+    assert "Can't pickle local object" in done.stderr
+    assert "WsmError: a worker process died (exit code 1;" in done.stderr
+
+
+def test_workers_of_one_run_after_another_come_from_one_server():
+    """What they load is loaded once."""
+    parents = {parent for _ in range(2) for parent in run_local([0, 1], parent_process_id, 2)}
+    assert len(parents) == 1
+    assert os.getpid() not in parents
+
+
+def test_workers_start_with_the_kernels_of_the_stages_loaded():
+    assert all("pipelines.stages.encode" in names for names in run_local([0, 1], loaded_modules, 2))
 
 
 def test_a_task_that_does_not_pickle_is_told():

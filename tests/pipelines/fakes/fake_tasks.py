@@ -1,6 +1,7 @@
 """Generator functions for the engines; worker processes import them by name."""
 
 import os
+import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,6 +17,14 @@ def numbers_below(task: int) -> Iterator[tuple[int, int]]:
 def process_id(_: object) -> Iterator[int]:
     time.sleep(0.05)
     yield os.getpid()
+
+
+def parent_process_id(_: object) -> Iterator[int]:
+    yield os.getppid()
+
+
+def loaded_modules(_: object) -> Iterator[list[str]]:
+    yield sorted(sys.modules)
 
 
 def zeros(size: int) -> Iterator[bytes]:
