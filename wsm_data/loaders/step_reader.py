@@ -58,7 +58,7 @@ class StepReader:
         self._verification = Verification(read.verify, [len(table) for table in sources.tables])
         self._pool = BufferPool(keep=read.prefetch_batches + 2, pinned=read.pin_memory)
         self._staging = threading.local()
-        self._readers = _open_readers(sources, read)
+        self._readers = open_readers(sources, read)
         self._looking_ahead = [item for item in dict.fromkeys(self._readers) if not isinstance(item, LocalShards)]
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -145,7 +145,7 @@ class StepReader:
         return dict(zip(LATENT_TENSORS, held[:size].view(shape), strict=True))
 
 
-def _open_readers(sources: Sources, read: ReadConfig) -> Sequence[ShardReader]:
+def open_readers(sources: Sources, read: ReadConfig) -> Sequence[ShardReader]:
     """A reader for each source; sources of one release share it."""
     by_root: dict[str, ShardReader] = {}
     for table in sources.tables:

@@ -13,18 +13,17 @@ from typing import Any
 import torch.utils.data
 import webdataset
 
-from wsm_data.errors import ConfigError, IntegrityError
+from wsm_data.errors import ConfigError
 from wsm_data.files.stores import LocalStore
-from wsm_data.loaders.clip_reads import MAX_READS
 from wsm_data.loaders.config import Arrangement, OrderConfig, ReadConfig, SourceConfig
+from wsm_data.loaders.member_reads import read_members
 from wsm_data.loaders.open_shards import open_shards
 from wsm_data.loaders.plan import plan_epoch, rows_per_rank
 from wsm_data.loaders.ranks import place_among_ranks
 from wsm_data.loaders.shard_reader import ShardReader
 from wsm_data.loaders.source_table import SourceTable, open_sources
 from wsm_data.loaders.verification import Verification
-from wsm_data.shards.clip_bytes import check_members
-from wsm_data.shards.index_row import IndexRow
+from wsm_data.shards.members import MEMBER_NAMES
 
 
 class ClipPipeline(webdataset.DataPipeline, webdataset.FluidInterface):  # type: ignore[misc]
@@ -135,26 +134,12 @@ class _Opened:
     def sample(self, ref: int) -> dict[str, Any]:
         """One clip as stock webdataset spells it."""
         row = self.table.index_row(ref)
-        data = self._read(row, checked=self.verification.is_due(0, ref))
+        data, members = read_members(self.reader, row, MEMBER_NAMES, checked=self.verification.is_due(0, ref))
         self.verification.passed(0, ref)
-        root = self.table.release.store.root
-        sample: dict[str, Any] = {"__key__": row.key, "__url__": f"{root}/{row.shard}"}
-        if isinstance(self.table.release.store, LocalStore):
+        store = self.table.release.store
+        sample: dict[str, Any] = {"__key__": row.key, "__url__": f"{store.root}/{row.shard}"}
+        if isinstance(store, LocalStore):
             sample["__local_path__"] = sample["__url__"]
-        for member in row.members:
+        for member in members:
             sample[member.file_name] = bytes(data[member.data_offset : member.data_offset + member.data_size])
         return sample
-
-    def _read(self, row: IndexRow, *, checked: bool) -> memoryview:
-        """The bytes of a clip; what a store or a cache may have damaged on the way is read again."""
-        data = memoryview(bytearray(row.clip_size))
-        for reads in range(1, MAX_READS + 1):
-            self.reader.read_into(row.shard, row.clip_offset, [data])
-            try:
-                if checked:
-                    check_members(data, row.members, f"{row.shard}, clip {row.key}")
-                break
-            except IntegrityError:
-                if reads == MAX_READS or not self.reader.forget(row.shard):
-                    raise
-        return data

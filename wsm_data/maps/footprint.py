@@ -1,6 +1,7 @@
-"""The robot as a disc: where its centre may be, and how near it comes to what is occupied."""
+"""The robot as a disc: where its centre may be, how near it comes to what is occupied, whether a path is free."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 from numba import njit
@@ -91,3 +92,32 @@ def _nearest_squares(cells: Uint8Array, positions: Float64Array) -> Float64Array
                         best = min(best, math.sqrt(dx * dx + dy * dy))
         nearest[index] = best
     return nearest
+
+
+def footprint_is_free(grid: OccupancyGrid, path_xy_m: Float64Array, radius_m: float) -> bool:
+    """Whether a disc can be driven along a path without touching what is occupied or leaving what is known.
+
+    The centre must be in FREE cells and its clearance at least the radius, at the positions and between them at
+    steps of no more than half a cell (spec/model.md, section 8).
+
+    Args:
+        grid: the map.
+        path_xy_m: positions in the world, m; [T, 2].
+        radius_m: radius of the disc, m.
+    """
+    dense = _densify(path_xy_m, grid.resolution_m / 2)
+    columns, rows = np.floor(grid.fractional_cells(dense) + 0.5).astype(np.int64).T
+    inside = (columns >= 0) & (columns < grid.cells.shape[1]) & (rows >= 0) & (rows < grid.cells.shape[0])
+    if not inside.all() or (grid.cells[rows, columns] != FREE).any():
+        return False
+    return bool((clearance_m(grid, dense) >= radius_m).all())
+
+
+def _densify(path_xy_m: Float64Array, step_m: float) -> Float64Array:
+    """The positions of a path [T, 2] and evenly spaced ones between them, no more than `step_m` apart; [N, 2]."""
+    path = np.asarray(path_xy_m, np.float64)
+    parts = [path[:1]]
+    for start, end in pairwise(path):
+        steps = max(1, math.ceil(float(np.linalg.norm(end - start)) / step_m))
+        parts.append(start + (end - start) * (np.arange(1, steps + 1) / steps)[:, None])
+    return np.concatenate(parts)

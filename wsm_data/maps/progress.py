@@ -42,3 +42,13 @@ def field_to_mm(field_m: Float32Array) -> Uint16Array:
     """Distances in m to the stored uint16 millimetres: rounded, 65534 at most, 65535 where there is none."""
     mm = np.minimum(np.rint(field_m.astype(np.float64) * 1000), UNREACHABLE_MM - 1)
     return np.where(np.isfinite(field_m), mm, UNREACHABLE_MM).astype(np.uint16)
+
+
+def mm_to_field(geodesic_mm: Uint16Array) -> Float32Array:
+    """Inverse of `field_to_mm`, to half a millimetre: float32 [Y, X], m, infinite where there is no distance."""
+    return np.where(geodesic_mm == UNREACHABLE_MM, np.inf, geodesic_mm / 1000.0).astype(np.float32)
+
+
+def progress(distance_m: Float64Array) -> Float64Array:
+    """Progress of each step towards the goal, D(l - 1) - D(l), m; [T] to [T - 1] (paper, appendix on post-training)."""
+    return np.asarray(distance_m, np.float64)[:-1] - np.asarray(distance_m, np.float64)[1:]

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wsm_data.maps.footprint import clearance_m, traversable
+from wsm_data.maps.footprint import clearance_m, footprint_is_free, traversable
 from wsm_data.schema.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 
 RESOLUTION_M = 0.05
@@ -60,3 +60,29 @@ def test_clearance_is_zero_inside_and_infinite_without_obstacles(grid_of):
     assert clearance_m(grid_of("..."), np.array([[0.075, 0.025]])).tolist() == [math.inf]
     # 0.025 m from the centre of a cell to the edge of its neighbour
     assert clearance_m(grid, np.array([0.025, 0.025])) == pytest.approx(0.025)
+
+
+def test_a_footprint_is_tested_between_the_positions_too(grid_of):
+    grid = grid_of(
+        """
+        .....................
+        .....................
+        .....................
+        .....................
+        ..........#..........
+        """
+    )
+    ends = np.array([[0.1, 0.2], [0.9, 0.2]])
+    middle = np.array([[0.525, 0.2]])
+    # the square's upper edge is at 0.05 m: 0.15 m below the path
+    assert (clearance_m(grid, ends) > 0.16).all()
+    assert clearance_m(grid, middle) == pytest.approx(0.15)
+    assert footprint_is_free(grid, ends, 0.149)
+    assert not footprint_is_free(grid, ends, 0.16)
+
+
+def test_a_footprint_is_not_free_where_the_map_is_unknown_or_ends(grid_of):
+    grid = grid_of("..?..")
+    assert footprint_is_free(grid, np.array([[0.02, 0.02], [0.08, 0.02]]), 0.01)
+    assert not footprint_is_free(grid, np.array([[0.02, 0.02], [0.2, 0.02]]), 0.01)
+    assert not footprint_is_free(grid, np.array([[0.2, 0.02], [0.3, 0.02]]), 0.01)

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wsm_data.maps.geodesic import geodesic_distance
-from wsm_data.maps.progress import field_to_mm, sample_distance
+from wsm_data.maps.progress import field_to_mm, mm_to_field, progress, sample_distance
 from wsm_data.schema.occupancy import OccupancyGrid
 
 
@@ -52,9 +52,14 @@ def test_a_field_belongs_to_a_map_of_its_own_shape(empty_room):
 @given(st.lists(st.floats(0, 65.5, width=32), min_size=1, max_size=20))
 def test_millimetres_keep_distances_to_half_a_millimetre(values):
     field = np.array([values], np.float32)
-    np.testing.assert_allclose(field_to_mm(field) / 1000, field, atol=0.0005 + 65.6 * 2**-24)
+    np.testing.assert_allclose(mm_to_field(field_to_mm(field)), field, atol=0.0005 + 65.6 * 2**-24)
 
 
 def test_unreachable_is_its_own_value_and_long_ways_saturate_below_it():
     stored = field_to_mm(np.array([[0.0, np.inf, 70.0, 65.534]], np.float32))
     assert stored.tolist() == [[0, 65535, 65534, 65534]]
+    assert mm_to_field(stored).tolist()[0][:2] == [0.0, np.inf]
+
+
+def test_progress_is_the_distance_gained_in_each_step():
+    assert progress(np.array([3.0, 2.5, 2.75])).tolist() == [0.5, -0.25]
