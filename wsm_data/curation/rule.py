@@ -19,16 +19,19 @@ from wsm_data.schema.arrays import Float32Array, Float64Array
 
 GEOMETRY_WEIGHTS: Mapping[str, float] = MappingProxyType(
     {
+        "passage_narrowest_m": 4.0,
+        "dead_end_retreat_m": 2.0,
         "detour_ratio": 1.0,
-        "passage_narrowest_m": 1.0,
-        "dead_end_share": 1.0,
+        "turning_total_rad": 1.0,
         "clearance_tight_share": 1.0,
-        "goal_behind_walls_share": 1.0,
+        "goal_behind_walls_share": 0.5,
     }
 )
-"""The default rule, which needs no model."""
+"""The default rule, which needs no model. A narrow door is felt by one score alone, a detour by five, so the weights
+differ. They were chosen among round numbers on homes with planted difficulties (bench/curation_validity.py), and are
+reported there on others."""
 
-MODEL_ORDER = ("rollout_unsafe_share", "rollout_mean_cost")
+MODEL_ORDER = ("rollout_unsafe_share", "rollout_mean_cost_m2")
 """Recommended for `lexicographic` once a policy was rolled out: how often it is unsafe, and then what it costs."""
 
 
