@@ -9,9 +9,10 @@ import cv2
 import numpy as np
 import simplejpeg
 
+import pipelines.cli
 import pipelines.stages.encode
 import pipelines.stages.index
-import pipelines.stages.map  # noqa: F401 - only to be loaded, as the two above
+import pipelines.stages.map  # noqa: F401 - only to be loaded, as the three above
 from pipelines.clip_config import ClipConfig
 from pipelines.scene_view import view_scene
 from wsm_data.checks.depth_pairs import depth_pair, relative_errors
