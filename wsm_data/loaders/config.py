@@ -98,6 +98,8 @@ class OrderConfig:
     chunk_sizes: tuple[int, ...] = tuple(range(1, MAX_CHUNK_LATENTS + 1))
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "remainder", Remainder(self.remainder))  # words, as files and users spell them
+        object.__setattr__(self, "arrangement", Arrangement(self.arrangement))
         for name in ("window_blocks", "global_batch", "pool"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} must be at least 1, found {getattr(self, name)}")
@@ -147,6 +149,13 @@ class ReadConfig:
     attempts: int = RequestConfig.attempts
     first_backoff_s: float = RequestConfig.first_backoff_s
     request_timeout_s: float = RequestConfig.timeout_s
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "verify", Verify(self.verify))  # words, as files and users spell them
+        object.__setattr__(self, "access", RemoteAccess(self.access))
+        for name in ("threads", "workers", "prefetch_batches"):
+            if getattr(self, name) < 0:
+                raise ValueError(f"{name} must not be negative, found {getattr(self, name)}")
 
 
 @dataclass(frozen=True, kw_only=True)
