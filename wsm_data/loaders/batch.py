@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from math import prod
 from types import MappingProxyType
+from typing import Any
 
 import torch
 
@@ -140,6 +141,10 @@ class BatchLayout:
             places[name] = TensorPlace(offset=offset, dtype=dtype, shape=shape, strides=strides)
             offset = _aligned(places[name].end)
         return MappingProxyType(places)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Cross to another process as its sizes."""
+        return layout_of, (self.rows, self.row_latents, self.sequences, self.latent_shape, self.dtype)
 
     @property
     def size_bytes(self) -> int:
