@@ -189,8 +189,9 @@ def _is_near(
 
 
 @numba.njit(cache=True)  # type: ignore[untyped-decorator]
-def _cell(coordinate_m: float, side_m: float) -> int:
-    return int(np.floor(float(coordinate_m) / side_m))
+def _cell(coordinate_m: float, within_m: float) -> int:
+    """Number of a cell: a little wider than paths may be apart, so that rounding does not put one cell between them."""
+    return int(np.floor(np.float64(coordinate_m) / (1.001 * within_m)))
 
 
 @numba.njit(cache=True)  # type: ignore[untyped-decorator]

@@ -82,4 +82,5 @@ def paths_are_near(a: Float32Array, b: Float32Array, within_m: float) -> bool:
 
 @numba.njit(cache=True)  # type: ignore[untyped-decorator]
 def _distance_m(p: Float32Array, q: Float32Array) -> float:
-    return float(np.hypot(float(p[0]) - float(q[0]), float(p[1]) - float(q[1])))
+    # Numba's float() of a float32 is a float32.
+    return float(np.hypot(np.float64(p[0]) - np.float64(q[0]), np.float64(p[1]) - np.float64(q[1])))

@@ -20,6 +20,7 @@ _NOTABLE = 0.5
 """A score by which a clip is easier than half of all is no reason, unless it has no better one."""
 
 _DIGITS = 3
+_ROUNDING = 1e-4  # a percentile is float32: 0.9 of 100 is 90
 _NO_UNIT = ("", "ratio")
 _UNIT_SUFFIX = re.compile(r"_(m|rad|share|ratio|rad_per_frame)$")
 
@@ -73,7 +74,8 @@ def value_text(value: float, unit: str) -> str:
     """A value with its unit; a share in per cent."""
     if unit == "share":
         return f"{100 * value:.{_DIGITS}g} %"
-    return f"{value:.{_DIGITS}g}" + ("" if unit in _NO_UNIT else f" {unit}")
+    number = f"{value:,.0f}" if abs(value) >= 10**_DIGITS else f"{value:.{_DIGITS}g}"
+    return number + ("" if unit in _NO_UNIT else f" {unit}")
 
 
 def score_label(info: ScorerInfo) -> str:
@@ -110,7 +112,7 @@ def _texts(score: ExplainedScore) -> tuple[list[str], NDArray[np.int64]]:
     digits = np.rint(values / 10.0**power).astype(np.int64)
     shares = np.nan_to_num(score.percentiles.astype(np.float64))
     below = 1 - shares if score.info.direction is Direction.LOWER else shares
-    percent = np.clip(np.floor(100 * below), 1, 99).astype(np.int64)
+    percent = np.clip(np.floor(100 * below + _ROUNDING), 1, 99).astype(np.int64)
     parts = np.stack([power, digits, percent])
     spans = parts.max(axis=1, initial=0) - parts.min(axis=1, initial=0) + 1
     code = np.ravel_multi_index(tuple(parts - parts.min(axis=1, initial=0)[:, None]), tuple(spans))
