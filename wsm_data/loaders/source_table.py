@@ -199,7 +199,8 @@ def _open_source(config: SourceConfig, release: Release, base: int) -> SourceTab
     if config.split:
         rows = rows[_is_of_split(config, release)[rows]]
     if not len(rows):
-        raise ConfigError(f"{release.store.root}: selection {config.selection} has no clip of split {config.split}")
+        wanted = f"split {config.split or 'any'}" + (f" and selection {selection}" if selection else "")
+        raise ConfigError(f"a source must have clips, but {config.release} has none of {wanted}")
     return SourceTable(config=config, release=release, selection=selection, rows=rows, base=base)
 
 
