@@ -268,3 +268,24 @@ def audit(
 ) -> None:
     """Find split leaks, repeated content and contradicting labels of a release."""
     _load("audit").audit(release, split_by, fail_on.value, near_m, as_json, quiet)
+
+
+@app.command("train")
+def train(
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder of the run; it goes on from its last checkpoint.")],
+    release: Annotated[
+        str | None, typer.Argument(metavar="[RELEASE]", help="Release to train on, unless the settings name sources.")
+    ] = None,
+    config: Annotated[Path | None, typer.Option("--config", "-c", help="TOML of differences to the defaults.")] = None,
+    assignments: Annotated[
+        list[str] | None, typer.Option("--set", "-s", help="One setting: section.key=value. Repeatable.")
+    ] = None,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Show settings and sizes; write nothing.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress bars.")] = False,
+) -> None:
+    """Pretrain the model; on several GPUs: torchrun -m pipelines.cli train ..."""
+    _load("train").train(release, out, config, assignments, dry_run, quiet)
+
+
+if __name__ == "__main__":
+    app()

@@ -9,7 +9,7 @@ from itertools import pairwise
 import torch
 from torch import Tensor
 
-from wsm_model.losses.flow import shifted_flow_time
+from wsm_model.flow import shifted_flow_time
 
 
 def flow_schedule(steps: int, shift: float) -> list[float]:

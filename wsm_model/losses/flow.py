@@ -1,27 +1,14 @@
-"""Flow matching of RGB latents (paper, equation 7 and appendix A.1).
-
-x_tau = (1 - tau) x + tau eps with tau in [0, 1] (1 is noise); the model predicts eps - x. One tau per chunk, drawn
-uniformly and shifted towards noise; the error is weighted by a bell over tau.
-"""
+"""The flow-matching error of RGB latents, weighted by a bell over the flow time (paper, appendix A.1)."""
 
 from functools import cache
 
 import torch
 from torch import Tensor
 
+from wsm_model.flow import shifted_flow_time
+
 GRID_POINTS = 1000
 """Timesteps of Wan2.2's schedule, over which the weight has mean 1."""
-
-
-def shifted_flow_time(uniform: Tensor, shift: float) -> Tensor:
-    """Flow time tau = gamma s / (1 + (gamma - 1) s) of s in [0, 1] (paper, appendix A.1)."""
-    return shift * uniform / (1 + (shift - 1) * uniform)
-
-
-def noised(clean: Tensor, noise: Tensor, flow_time: Tensor) -> Tensor:
-    """(1 - tau) x + tau eps; `flow_time` [...] has the leading dimensions of `clean`."""
-    tau = flow_time.reshape(*flow_time.shape, *[1] * (clean.dim() - flow_time.dim()))
-    return (1 - tau) * clean + tau * noise
 
 
 @cache

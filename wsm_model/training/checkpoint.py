@@ -22,7 +22,7 @@ from torch.distributed.checkpoint.state_dict_saver import save
 from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.files.atomic import write_text
 from wsm_data.files.jsonlines import canonical_json
-from wsm_model.training.ranks import rank_and_world_size, wait_for_all
+from wsm_model.ranks import rank_and_world_size, wait_for_all
 
 _STATE = "state.json"
 _FOLDER = re.compile(r"step-(\d{6,})")

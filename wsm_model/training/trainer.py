@@ -13,9 +13,10 @@ from torch import Tensor
 from torch.nn.utils import clip_grad_norm_
 
 from wsm_data.errors import NumericalError
+from wsm_model.batches import ClipBatch, TrainingInputs, spans_of, training_inputs
 from wsm_model.losses.total import LossCounts, loss_counts, pretraining_loss
 from wsm_model.model import WorldSlamModel
-from wsm_model.training.batches import ClipBatch, TrainingInputs, spans_of, training_inputs
+from wsm_model.ranks import rank_and_world_size, sum_over_ranks, whole
 from wsm_model.training.checkpoint import (
     TrainingState,
     checkpoints,
@@ -25,7 +26,6 @@ from wsm_model.training.checkpoint import (
 )
 from wsm_model.training.config import Precision, TrainingConfig
 from wsm_model.training.metrics import MetricsWriter
-from wsm_model.training.ranks import rank_and_world_size, sum_over_ranks, whole
 from wsm_model.training.schedule import learning_rate, make_optimiser, set_learning_rate
 
 

@@ -12,8 +12,8 @@ from typing import Protocol
 import torch
 from torch import Tensor
 
+from wsm_model.flow import noised, shifted_flow_time
 from wsm_model.inputs import ModelInputs
-from wsm_model.losses.flow import noised, shifted_flow_time
 from wsm_model.mot.chunks import SequenceSpan, chunk_bounds
 
 

@@ -4,13 +4,14 @@ With several processes every layer is sharded with FSDP2; alone, the model is le
 """
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 
 import torch
 import torch.distributed as dist
 from torch import Tensor
 from torch.distributed.device_mesh import init_device_mesh
-from torch.distributed.fsdp import fully_shard
+from torch.distributed.fsdp import FSDPModule, fully_shard
 
 from wsm_model.mot.transformer import MixtureOfTransformers
 
@@ -40,6 +41,18 @@ def shard_model(model: MixtureOfTransformers, device: torch.device) -> None:
     for layer in model.layers:
         fully_shard(layer, mesh=mesh)
     fully_shard(model, mesh=mesh)
+
+
+@contextmanager
+def unsharded(model: MixtureOfTransformers) -> Iterator[None]:
+    """Hold what is outside of the layers in whole on every rank, for passes that do not begin with `forward`."""
+    if isinstance(model, FSDPModule):
+        model.unshard()
+    try:
+        yield
+    finally:
+        if isinstance(model, FSDPModule):
+            model.reshard()
 
 
 def sum_over_ranks(values: Iterable[float], device: torch.device) -> list[float]:

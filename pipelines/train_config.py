@@ -1,0 +1,68 @@
+"""Settings of `wsm train`."""
+
+from dataclasses import dataclass, field
+
+from wsm_data.loaders.config import OrderConfig, ReadConfig, SourceConfig
+from wsm_model.config import Variant
+from wsm_model.inference.session import SessionConfig
+from wsm_model.model import Attention
+from wsm_model.training.config import TrainingConfig
+
+
+@dataclass(frozen=True, kw_only=True)
+class ModelChoice:
+    """Which model is trained.
+
+    Attributes:
+        size: `tiny`, `small` or `wsm5b`.
+        variant: `slam`, or `idm` for the ablation without SLAM.
+        weights: folder of the transformer of Wan2.2-TI2V-5B to start from; empty: from random weights.
+        attention: how the joint attention is evaluated: `auto`, `flex`, `blocks` or `dense`.
+    """
+
+    size: str = "tiny"
+    variant: Variant = Variant.SLAM
+    weights: str = ""
+    attention: Attention = Attention.AUTO
+
+
+@dataclass(frozen=True, kw_only=True)
+class HeldOutConfig:
+    """What is measured and drawn on clips that are not trained on.
+
+    Attributes:
+        split: split of those clips.
+        clips: clips that are evaluated after the last step; 0: none.
+        max_latents: they are cut to prefixes of this length; 0: whole clips.
+        flow_steps: sampler steps of a dream (paper: 8).
+        session: chunk size, cache and backend of the streaming estimation.
+    """
+
+    split: str = "test"
+    clips: int = 16
+    max_latents: int = 0
+    flow_steps: int = 8
+    session: SessionConfig = field(default_factory=SessionConfig)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainRunConfig:
+    """Everything a training run is made from.
+
+    Attributes:
+        sources: releases and selections that are trained on.
+        order: which clips make up which step.
+        read: how they are read.
+        model: which model.
+        training: optimiser, losses, checkpoints.
+        held_out: what is measured on other clips.
+        codec_weights: folder of the weights of the release's codec, where it has any; only for pictures.
+    """
+
+    sources: tuple[SourceConfig, ...]
+    order: OrderConfig = field(default_factory=lambda: OrderConfig(global_batch=48))
+    read: ReadConfig = field(default_factory=ReadConfig)
+    model: ModelChoice = field(default_factory=ModelChoice)
+    training: TrainingConfig = field(default_factory=TrainingConfig)
+    held_out: HeldOutConfig = field(default_factory=HeldOutConfig)
+    codec_weights: str = ""
