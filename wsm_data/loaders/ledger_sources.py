@@ -9,6 +9,7 @@ from wsm_data.errors import ConfigError
 from wsm_data.files.jsonlines import canonical_json
 from wsm_data.files.stores import open_store
 from wsm_data.loaders.config import Arrangement, OrderConfig, Remainder, SourceConfig
+from wsm_data.loaders.query_table import QueryConfig, open_queries
 from wsm_data.loaders.source_table import Sources, open_sources
 from wsm_data.shards.manifest import release_digest
 from wsm_data.shards.release import read_manifest
@@ -54,7 +55,8 @@ def open_recorded_sources(identity: Mapping[str, Any], releases: Sequence[str], 
                 weight=source["weight"],
             )
         )
-    sources = open_sources(configs)
+    queries = identity["sources"][0].get("queries")
+    sources = open_sources(configs) if queries is None else open_queries(configs, QueryConfig(**queries))
     for stated, found in zip(identity["sources"], sources.identity(), strict=True):
         if stated != found:
             raise ConfigError(
@@ -65,17 +67,16 @@ def open_recorded_sources(identity: Mapping[str, Any], releases: Sequence[str], 
 
 
 def refs_of_key(sources: Sources, key: str) -> list[int]:
-    """Refs of a clip: one for every source that has it.
+    """Refs of a clip: one for every source that has it, or one for every query.
 
     Raises:
         ConfigError: no source has it.
     """
-    refs = []
+    refs: list[int] = []
     for table in sources.tables:
         row = int(table.release.index.rows_of([key])[0])
-        place = int(np.searchsorted(table.rows, row))
-        if row >= 0 and place < len(table) and table.rows[place] == row:
-            refs.append(table.base + place)
+        first, last = (int(np.searchsorted(table.rows, row, side)) for side in ("left", "right"))
+        refs += range(table.base + first, table.base + last)
     if not refs:
         raise ConfigError(f"no source of the run has a clip {key!r}; `wsm inspect RELEASE` lists what a release has")
     return refs
