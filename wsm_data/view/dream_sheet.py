@@ -13,7 +13,7 @@ from wsm_data.view.depth_colours import depth_picture, draw_depth_bar
 from wsm_data.view.style import BAR, BAR_SECOND, MUTED, figure_png, figure_style, new_figure
 
 _PICTURE_PX = 240
-_LABEL_PX = 130
+_LABEL_PX = 150
 _BAR_PX = 90
 _GAP_PX = 6
 _TOP_PX = 70
