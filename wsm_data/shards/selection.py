@@ -17,6 +17,7 @@ import pyarrow.parquet as pq
 
 from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.files.atomic import atomic_file
+from wsm_data.files.digest import digest_json
 from wsm_data.files.jsonlines import canonical_json
 from wsm_data.files.stores import Store, open_store
 from wsm_data.schema.arrays import Float64Array
@@ -121,7 +122,7 @@ def is_selection_file(text: str) -> bool:
 
 def write_selection(path: Path, selection: Selection) -> None:
     """Write a selection atomically; equal selections and an equal pyarrow give equal bytes."""
-    stated = {
+    stated: dict[str, Any] = {
         "version": SELECTION_VERSION,
         "name": selection.name,
         "release_digest": selection.release_digest,
@@ -129,6 +130,7 @@ def write_selection(path: Path, selection: Selection) -> None:
         "command": selection.command,
         "clips": len(selection),
     }
+    stated["sha256"] = digest_json(stated)  # parquet has checksums for its pages alone
     schema = _SCHEMA.with_metadata({_METADATA: canonical_json(stated)})
     columns = [selection.keys, pa.array(selection.ranks), pa.array(selection.scores), selection.why]
     with atomic_file(path) as file:
@@ -188,6 +190,8 @@ def _parse(table: pa.Table, stated: Any) -> Selection:
         raise ValueError(f"its metadata has no {_METADATA.decode()}")
     if stated["version"] != SELECTION_VERSION:
         raise ValueError(f"version must be {SELECTION_VERSION}, found {stated['version']!r}; use a matching wsm")
+    if digest_json({key: value for key, value in stated.items() if key != "sha256"}) != stated["sha256"]:
+        raise ValueError("its metadata was changed since it was written")
     if not table.schema.equals(_SCHEMA) or table.num_rows != stated["clips"]:
         raise ValueError(f"it must have {stated['clips']} rows of {_SCHEMA.names}, found {table.num_rows}")
     selection = Selection(

@@ -12,7 +12,7 @@ from wsm_data.errors import IntegrityError
 from wsm_data.schema.clip import Clip
 from wsm_data.shards.fragment import build_fragment, write_fragment
 from wsm_data.shards.plan import PlannedClip, ShardPlan, plan_shards
-from wsm_data.shards.writer import write_shard
+from wsm_data.shards.writer import write_blocks, write_shard
 
 # webdataset leaves the file it reads to the garbage collector
 reads_with_webdataset = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
@@ -131,3 +131,11 @@ def test_a_shard_under_another_name_is_a_bug(packed: SimpleNamespace) -> None:
 def test_a_shard_of_nothing_is_an_end_of_archive(tmp_path: Path) -> None:
     plan = ShardPlan(name="train-000000.tar", split="train", clips=())
     assert write_shard(tmp_path / plan.name, plan, Path).bytes == 1024
+
+
+def test_a_clip_of_more_or_fewer_bytes_than_planned_is_refused(tmp_path):
+    clip = PlannedClip(key="g/s/1", split="train", size_bytes=1024)
+    plan = ShardPlan(name="train-000000.tar", split="train", clips=(clip,))
+    with pytest.raises(IntegrityError, match="clip g/s/1 must have 1024 bytes, found 512"):
+        write_blocks(tmp_path / plan.name, plan, lambda _: [bytes(512)])
+    assert list(tmp_path.iterdir()) == []
