@@ -7,7 +7,8 @@ import numpy as np
 import torch
 
 from wsm_data.loaders.batch import LATENT_TENSORS, NO_SEQUENCE, POSE_SLOTS, BatchLayout, layout_of
-from wsm_data.loaders.clip_reads import POSE_BYTES, ClipPlace
+from wsm_data.loaders.clip_places import ClipPlace
+from wsm_data.loaders.clip_reads import POSE_BYTES
 from wsm_data.loaders.plan import EpochPlan
 
 ANCHOR_SLOTS = POSE_SLOTS - 1

@@ -12,7 +12,8 @@ from wsm_data.errors import ConfigError
 from wsm_data.loaders.arrangement import ArrangedClip, arrange, batch_layout, describe, slots_of
 from wsm_data.loaders.batch import LATENT_DTYPES, LATENT_TENSORS, BatchLayout, PackedBatch
 from wsm_data.loaders.buffers import BufferPool
-from wsm_data.loaders.clip_reads import clip_places, read_clip, span_of
+from wsm_data.loaders.clip_places import clip_places, span_of
+from wsm_data.loaders.clip_reads import read_clip
 from wsm_data.loaders.config import ReadConfig
 from wsm_data.loaders.local_shards import LocalShards
 from wsm_data.loaders.open_shards import open_shards

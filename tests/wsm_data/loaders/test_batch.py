@@ -1,4 +1,5 @@
 import pickle
+from itertools import pairwise
 
 import pytest
 import torch
@@ -27,7 +28,7 @@ def _packed(layout, fill: int = 0) -> PackedBatch:
 def test_tensors_lie_apart_and_aligned_within_the_block(layout):
     places = list(layout.tensors.values())
     assert all(place.offset % 64 == 0 for place in places)
-    assert all(one.end <= other.offset for one, other in zip(places, places[1:], strict=False))
+    assert all(one.end <= other.offset for one, other in pairwise(places))
     assert places[-1].end <= layout.size_bytes < places[-1].end + 64
 
 

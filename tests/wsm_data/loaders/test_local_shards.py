@@ -24,7 +24,7 @@ def folder(tmp_path_factory) -> Path:
 
 
 def _open_files() -> int:
-    return len(os.listdir("/proc/self/fd"))
+    return len(list(Path("/proc/self/fd").iterdir()))
 
 
 @given(

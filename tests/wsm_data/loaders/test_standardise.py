@@ -1,5 +1,6 @@
 import threading
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -77,8 +78,6 @@ def test_the_number_of_threads_of_torch_changes_nothing():
 
 def test_no_thread_is_started():
     """Torch keeps a pool of threads for each thread that gives it long operations; they show under /proc."""
-    from pathlib import Path
-
     stored, counts = torch.ones((40, CHANNELS, 96, 80), dtype=torch.float16), []
 
     def work() -> None:
@@ -115,5 +114,5 @@ def test_depth_has_the_statistics_of_the_release_and_colour_those_of_its_codec_w
 def test_a_release_without_training_clips_cannot_be_standardised(released):
     empty = LatentStatistics(count=0, mean=(), std=())
     manifest = replace(released.release.manifest, depth_statistics=empty, rgb_statistics=empty)
-    with pytest.raises(ConfigError, match="must have latent statistics to standardise by.*standardise = false"):
+    with pytest.raises(ConfigError, match=r"must have latent statistics to standardise by.*standardise = false"):
         standardisations(manifest)

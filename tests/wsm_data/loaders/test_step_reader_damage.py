@@ -13,7 +13,7 @@ import pytest
 
 from wsm_data.errors import IntegrityError
 from wsm_data.files.digest import sha256_file
-from wsm_data.loaders.clip_reads import READ_MEMBERS
+from wsm_data.loaders.clip_places import READ_MEMBERS
 from wsm_data.loaders.config import OrderConfig, ReadConfig, SourceConfig
 from wsm_data.loaders.plan import EpochPlan
 from wsm_data.loaders.source_table import open_sources
