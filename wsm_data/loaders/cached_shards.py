@@ -3,6 +3,7 @@
 import logging
 import os
 import threading
+import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from itertools import accumulate
@@ -23,6 +24,7 @@ _LOGGER = logging.getLogger(__name__)
 _DOWNLOADS_AHEAD = 2  # while one is hashed to its end and brought to disk, the next is on its way
 _POLL_S = 0.02
 _IDLE_S = 1.0
+_RETRY_S = 5.0  # what is wanted is looked for again: it may have been evicted, and being asked for keeps it young
 _WASTEFUL = 4  # bytes downloaded for a byte read
 
 
@@ -56,7 +58,7 @@ class CachedShards:
         self._closed = threading.Event()
         self._changed = threading.Condition()
         self._announced: Announcements[None] = Announcements()
-        self._tried: set[str] = set()
+        self._next_try_s: dict[str, float] = {}
         self._downloaded_bytes = self._read_bytes = 0
         self._has_warned = False
         self._ahead = [
@@ -89,7 +91,6 @@ class CachedShards:
         with self._changed:
             for span in self._announced.unknown(spans):
                 self._announced.add(span, None)
-            self._tried.clear()
             self._changed.notify_all()
 
     def forget(self, shard: str) -> bool:
@@ -151,7 +152,7 @@ class CachedShards:
         if found is not None and found[0].end == piece.end:
             self._announced.remove(found[0])
             if piece.shard not in self._announced.shards():
-                self._tried.discard(piece.shard)
+                self._next_try_s.pop(piece.shard, None)
                 self._changed.notify_all()
 
     def _wanted(self) -> list[CachedShard]:
@@ -166,11 +167,12 @@ class CachedShards:
         while not self._closed.is_set():
             with self._changed:
                 wanted = self._wanted()
-                shard = next((shard for shard in wanted if shard.name not in self._tried), None)
+                now_s = time.monotonic()
+                shard = next((shard for shard in wanted if self._next_try_s.get(shard.name, 0.0) <= now_s), None)
                 if shard is None:
                     self._changed.wait(_IDLE_S)
                     continue
-                self._tried.add(shard.name)
+                self._next_try_s[shard.name] = now_s + _RETRY_S
             self._try_ahead(shard, wanted)
 
     def _try_ahead(self, shard: CachedShard, wanted: Sequence[CachedShard]) -> None:

@@ -1,9 +1,10 @@
 """Batches of some steps, in order: read by threads, by worker processes, or by whoever asks for them."""
 
 from collections.abc import Callable, Generator, Sequence
+from itertools import chain, islice, repeat
 
 from wsm_data.loaders.batch import Batch, PackedBatch
-from wsm_data.loaders.config import ReadConfig
+from wsm_data.loaders.config import ReadConfig, RemoteAccess
 from wsm_data.loaders.plan import EpochPlan
 from wsm_data.loaders.prefetch import Prefetch
 from wsm_data.loaders.step_reader import StepReader
@@ -12,6 +13,11 @@ from wsm_data.loaders.worker_processes import StepDataset, read_in_processes
 
 BatchStream = Prefetch[Batch] | Generator[Batch, None, None]
 """Batches one after the other; `close` stops reading and waits until threads and processes have ended."""
+
+
+_CLIPS_AHEAD = 8192
+"""Clips of all ranks whose shards a cache of shards is told of in advance. The lanes of a step come to new shards at
+about the same time, so that many are needed at once: the downloads must begin some thousand clips earlier."""
 
 
 def open_stream(
@@ -44,8 +50,7 @@ def open_stream(
         timing.add(watch.seconds)
         return batch
 
-    def announce(step: int) -> None:
-        reader.announce(plan, step)
+    announce = _announcer(reader, plan, steps, read)
 
     def read_step(step: int) -> Batch:
         return finished(reader.read(plan, step))
@@ -55,6 +60,20 @@ def open_stream(
     if read.threads and not inline:
         return Prefetch(iter(steps), read_step, announce, threads=read.threads, depth=read.prefetch_batches)
     return _one_by_one(steps, read_step, announce)
+
+
+def _announcer(reader: StepReader, plan: EpochPlan, steps: Sequence[int], read: ReadConfig) -> Callable[[int], None]:
+    """What announces the next steps; it is called once for each step, before that is read."""
+    upcoming = iter(steps)
+    ahead = _CLIPS_AHEAD // plan.order.global_batch if read.access is RemoteAccess.SHARDS else 0
+    counts = chain([1 + ahead], repeat(1))
+
+    def announce(step: int) -> None:
+        del step
+        for later in islice(upcoming, next(counts)):
+            reader.announce(plan, later)
+
+    return announce
 
 
 def _one_by_one(
