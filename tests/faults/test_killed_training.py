@@ -1,0 +1,90 @@
+"""Ranks of a training run are killed and resumed, also on another number of ranks; the ledger proves what was seen."""
+
+import json
+import secrets
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from pipelines.commands.audit_run import audit_run
+from wsm_data.errors import IntegrityError
+from wsm_data.loaders.audit_run import audit_epochs
+from wsm_data.loaders.ledger_sources import open_recorded_sources
+from wsm_data.loaders.ledger_timeline import read_timeline
+
+PROGRAM = Path(__file__).parent / "fakes" / "train_rank.py"
+WAIT_S = 120  # far beyond any start on a busy machine: what takes longer hangs
+CLIPS, STEPS = 39, 10  # in steps of four, the last one with a repeated clip
+
+
+@pytest.fixture
+def run(tmp_path, tiny, make_clip):
+    """Settings that all ranks share."""
+    clips = [make_clip(f"synth_d435i/home_{number % 5:04d}/{number:06d}", latents=2) for number in range(CLIPS)]
+    tiny.pack(tmp_path / "many", clips, shard_bytes=250_000)
+    return {
+        "release": str(tmp_path / "many"),
+        "ledger": str(tmp_path / "ledger"),
+        "checkpoint": str(tmp_path / "checkpoint.json"),
+        "epochs": 2,
+        "checkpoint_every": 3,
+        "killed_before_the_step": True,
+    }
+
+
+def session(run, tmp_path, world_size, *, victim=-1, killed_at=None, **changes):
+    """All ranks at once, each slower than the one before; returns how each of them ended."""
+    group = tmp_path / secrets.token_hex(8)
+    processes = []
+    for rank in range(world_size):
+        settings = run | changes | {"group": str(group), "rank": rank, "world_size": world_size}
+        settings |= {"pause_s": 0.01 * rank, "killed_at": killed_at if rank == victim else None}
+        processes.append(subprocess.Popen([sys.executable, str(PROGRAM), json.dumps(settings)], stderr=subprocess.PIPE))
+    try:
+        errors = [process.communicate(timeout=WAIT_S)[1].decode() for process in processes]
+    finally:
+        for process in processes:
+            process.kill()
+            process.wait()
+    codes = [process.returncode for process in processes]
+    assert codes[victim] == -signal.SIGKILL or killed_at is None, errors
+    assert killed_at is None or all(code != 0 for code in codes), "no rank may go on without the others"
+    assert killed_at is not None or codes == [0] * world_size, errors
+    return codes
+
+
+def prove(run):
+    timeline = read_timeline(Path(run["ledger"]))
+    audits = audit_epochs(timeline, open_recorded_sources(timeline.identity, [run["release"]], []))
+    assert timeline.misfits == ()
+    assert [audit.misfits for audit in audits] == [()] * len(audits)
+    return timeline, audits
+
+
+def test_killed_ranks_are_resumed_on_any_world_size_and_nothing_is_lost_or_seen_twice(run, tmp_path, capsys):
+    session(run, tmp_path, 2, victim=1, killed_at=[0, 7])
+    session(run, tmp_path, 2, victim=0, killed_at=[1, 4], killed_before_the_step=False)
+    session(run, tmp_path, 4, victim=3, killed_at=[1, 8])
+    session(run, tmp_path, 1)
+    timeline, audits = prove(run)
+    assert sorted({file.world_size for file in timeline.files}) == [1, 2, 4]
+    assert [(audit.complete, audit.seen_once, audit.seen_more, audit.never) for audit in audits] == [
+        (True, CLIPS - 1, 1, 0)
+    ] * 2
+    # checkpoints every third step: 7 steps and an unfinished one went to 6, steps 3 and 4 of the second epoch to 3, ...
+    assert [(again.epoch, again.start, again.end) for again in timeline.again] == [(0, 6, 8), (1, 3, 5), (1, 6, 9)]
+    audit_run(Path(run["ledger"]), [run["release"]], [], None, None, None)
+    assert capsys.readouterr().out.splitlines()[-1].startswith("2 of 2 epochs complete, no step missing, none twice")
+
+
+def test_a_resume_from_beyond_what_was_trained_is_found_out(run, tmp_path):
+    session(run, tmp_path, 1, victim=0, killed_at=[0, 4])
+    checkpoint = Path(run["checkpoint"])
+    state = json.loads(checkpoint.read_text())
+    checkpoint.write_text(json.dumps(state | {"step": 7}))
+    session(run, tmp_path, 1)
+    with pytest.raises(IntegrityError, match="epoch 0: the steps 5 to 7 are in no session"):
+        audit_run(Path(run["ledger"]), [run["release"]], [], None, None, None)
