@@ -1,0 +1,152 @@
+import shlex
+import shutil
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from pipelines.config import parse_assignments
+from pipelines.registry import load_stage
+from pipelines.runner import RunOptions, run_stage
+from pipelines.stages.score import ScoreConfig
+from pipelines.stages.select import SelectConfig, install_selection
+from wsm_data.curation.rule import RuleConfig
+from wsm_data.errors import ConfigError
+from wsm_data.files.typed_toml import build_config
+from wsm_data.shards.manifest import release_digest
+from wsm_data.shards.release import open_release
+from wsm_data.shards.selection import read_selection
+
+QUIET = RunOptions(quiet=True)
+
+
+@pytest.fixture(scope="module")
+def scored(tmp_path_factory, finished):
+    """A release with its scores."""
+    folder = tmp_path_factory.mktemp("scored") / "release"
+    shutil.copytree(finished.release, folder)
+    run_stage(load_stage("score"), ScoreConfig(release=str(folder)), folder.with_name("score"), QUIET)
+    return folder
+
+
+@pytest.fixture
+def release(scored, tmp_path):
+    return shutil.copytree(scored, tmp_path / "release")
+
+
+@pytest.fixture
+def select(release, tmp_path):
+    def go(out="select", options=QUIET, **changes):
+        config = SelectConfig(**{"release": str(release), "fraction": 0.5, **changes})
+        report = run_stage(load_stage("select"), config, tmp_path / out, options)
+        return report, tmp_path / out / config.file_name
+
+    return go
+
+
+def test_a_selection_is_written_and_installed_into_its_release(select, release):
+    report, path = select()
+    found = read_selection(release, "hard", release_digest(open_release(release).manifest))
+    assert (release / "selections" / "hard.parquet").read_bytes() == path.read_bytes()
+    train = open_release(release).manifest.clips_by_split["train"]
+    assert len(found) == report.facts["clips chosen"] == max(1, int(0.5 * train + 0.5))
+    assert all(found.why.to_pylist())
+
+
+def test_the_command_in_the_file_makes_the_same_bytes(select, release, tmp_path):
+    weights = {"detour_ratio": 2.0, "path_length_m": 1.0}
+    _, path = select(rule=RuleConfig(weights=weights), name="long")
+    metadata = read_selection(release, "long", release_digest(open_release(release).manifest))
+    words = shlex.split(metadata.command)
+    assert words[:3] == ["wsm", "select", "RELEASE"]
+    config = build_config(SelectConfig, {"release": str(release), **parse_assignments(words[4::2])})
+    run_stage(load_stage("select"), config, tmp_path / "again", QUIET)
+    assert (tmp_path / "again" / "long.parquet").read_bytes() == path.read_bytes()
+
+
+def test_another_number_of_workers_writes_the_same_bytes(select):
+    _, one = select(out="one")
+    _, two = select(out="two", options=RunOptions(quiet=True, workers=2))
+    assert one.read_bytes() == two.read_bytes()
+
+
+def test_the_place_of_the_release_does_not_show(select, release, tmp_path):
+    _, here = select(out="here")
+    moved = shutil.move(release, tmp_path / "moved")
+    _, there = select(out="there", release=str(moved))
+    assert here.read_bytes() == there.read_bytes()
+
+
+def test_every_setting_stands_in_the_file_and_what_became_of_the_clips(select, release):
+    select()
+    rule = read_selection(release, "hard", release_digest(open_release(release).manifest)).rule
+    assert set(rule["settings"]) == {"diversity", "exclude", "fraction", "name", "quotas", "rule", "split"}
+    assert set(rule["settings"]["rule"]["weights"]) <= set(rule["scores"])
+    assert rule["clips"]["chosen"] + rule["clips"]["near-duplicates left out"] <= rule["clips"]["of the split"]
+
+
+def test_a_second_run_has_nothing_to_do_and_new_scores_are_noticed(select, release):
+    assert select()[0].ran == ("selection",)
+    assert select()[0].ran == ()
+    path = release / "scores.parquet"
+    table = pq.read_table(path)
+    column = table.schema.get_field_index("detour_ratio")
+    changed = pa.array(table["detour_ratio"].to_numpy()[::-1].copy())
+    pq.write_table(table.set_column(column, table.schema.field(column), changed), path)
+    assert select()[0].ran == ("selection",)
+
+
+def test_scores_of_another_release_are_refused_with_what_differs(select, release, tmp_path):
+    table = pq.read_table(release / "scores.parquet").slice(1)
+    other = table.schema.metadata[b"wsm.scores"].replace(
+        release_digest(open_release(release).manifest).encode(), b"0" * 64
+    )
+    pq.write_table(table.replace_schema_metadata({b"wsm.scores": other}), tmp_path / "other.parquet")
+    with pytest.raises(
+        ConfigError, match=r"(?s)of another release.*release digest: 0{64} -> .*clips: 4 -> 5.*added: 1"
+    ):
+        select(scores=str(tmp_path / "other.parquet"))
+
+
+@pytest.mark.parametrize("name", ["detour_ratio", "goal_reachable"])
+def test_a_score_that_is_nan_is_refused_by_its_name(select, release, name):
+    path = release / "scores.parquet"
+    table = pq.read_table(path)
+    values = table[name].to_numpy().copy()
+    values[2] = np.nan
+    column = table.schema.get_field_index(name)
+    pq.write_table(table.set_column(column, table.schema.field(column), pa.array(values)), path)
+    with pytest.raises(ConfigError, match=f"the score {name} of clip .* must be a number, found NaN"):
+        select()
+
+
+def test_missing_scores_say_what_to_run(select, release):
+    (release / "scores.parquet").unlink()
+    with pytest.raises(ConfigError, match=r"no scores at .*; run `wsm score RELEASE` first"):
+        select()
+
+
+def test_an_unknown_score_in_a_rule_is_refused_by_its_name(select):
+    with pytest.raises(ConfigError, match=r"'detuor_ratio'.*did you mean detour_ratio"):
+        select(rule=RuleConfig(weights={"detuor_ratio": 1.0}))
+
+
+def test_other_settings_in_the_same_folder_are_refused_with_the_difference(select):
+    select()
+    with pytest.raises(ConfigError, match=r"fraction: 0\.5 -> 0\.25"):
+        select(fraction=0.25)
+
+
+def test_a_selection_that_was_removed_from_its_release_is_put_back(select, release):
+    _, path = select()
+    installed = release / "selections" / "hard.parquet"
+    installed.unlink()
+    install_selection(path, SelectConfig(release=str(release)))
+    assert installed.read_bytes() == path.read_bytes()
+
+
+def test_behind_a_url_nothing_is_installed_and_the_user_is_told(select, caplog):
+    _, path = select()
+    install_selection(path, SelectConfig(release="memory://release"))
+    assert "is not copied to memory://release: put it at selections/hard.parquet there" in caplog.text
