@@ -1,7 +1,8 @@
 """One rank of a training run: batches, a collective each step, a checkpoint by rank 0, and maybe a sudden end.
 
-Usage: train_rank.py SETTINGS, as JSON: release, ledger, checkpoint, group (file of the process group), rank, world_size,
-epochs, pause_s (of each step), checkpoint_every (steps), killed_at ([epoch, step] or null), killed_before_the_step.
+Usage: train_rank.py SETTINGS, as JSON: release, ledger, checkpoint, group (file of the process group), rank,
+world_size, epochs, pause_s (of each step), checkpoint_every (steps), killed_at ([epoch, step] or null),
+killed_before_the_step.
 """
 
 import json
