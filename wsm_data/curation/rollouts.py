@@ -95,6 +95,8 @@ def read_rollouts(location: str | Path, release_digest: str, index: IndexTable) 
     """
     where = str(location)
     table = _load(where, release_digest)
+    for name in (one for one in table.column_names if one != "mean_cost_m2"):
+        _refuse_where(pc.is_null(table[name]), table, where, f"{name} must be there")
     known = pc.index_in(table["key"], value_set=index.columns(["key"])["key"])
     _refuse_where(pc.is_null(known), table, where, "a row must be of a clip of the release")
     latents = pa.array(index.numbers("latents")[known.to_numpy()])
@@ -120,7 +122,8 @@ def rollout_scores(rollouts: pa.Table, keys: pa.ChunkedArray) -> dict[str, Float
     wanted = [(name, "mean") for name in _NUMBERS] + [("unsafe_share", "min")]
     by_clip = rollouts.group_by("key", use_threads=False).aggregate(wanted)
     rows = pc.index_in(keys, value_set=by_clip["key"])
-    aggregated = {name: by_clip[name].take(rows).to_numpy().astype(np.float64) for name in by_clip.column_names[:-1]}
+    names = [f"{name}_{how}" for name, how in wanted]
+    aggregated = {name: by_clip[name].take(rows).to_numpy().astype(np.float64) for name in names}
     never_safe = aggregated["unsafe_share_min"]
     values = (
         aggregated["unsafe_share_mean"],
@@ -155,14 +158,11 @@ def _load(where: str, release_digest: str) -> pa.Table:
 
 
 def _check_numbers(name: str, table: pa.Table, where: str) -> None:
-    """A number is there, finite and not negative; a cost is missing just where no dream was safe."""
+    """A number is finite and not negative; a cost is missing just where no dream was safe."""
     values = table[name]
-    missing = pc.is_null(values)
     if name == "mean_cost_m2":
-        nothing_safe = pc.equal(table["unsafe_share"], 1.0)
+        missing, nothing_safe = pc.is_null(values), pc.equal(table["unsafe_share"], 1.0)
         _refuse_where(pc.xor(missing, nothing_safe), table, where, f"{name} must be null just where no dream is safe")
-    else:
-        _refuse_where(missing, table, where, f"{name} must be there")
     sound = pc.and_(pc.is_finite(values), pc.greater_equal(values, 0.0))
     if name == "unsafe_share":
         sound = pc.and_(sound, pc.less_equal(values, 1.0))
