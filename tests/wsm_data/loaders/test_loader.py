@@ -206,6 +206,7 @@ def test_inside_a_dataloader_only_what_works_there_is_allowed(make_loader, tmp_p
         next(iter(outer))
 
 
+@pytest.mark.slow
 def test_the_goal_is_that_of_the_meta_data(tmp_path, make_source, run_pipeline):
     """On clips of the pipeline: the last pose is the goal in the first camera's frame, rounded to float32."""
     run_pipeline(make_source(trajectories=1, cameras=("d435i",)), tmp_path)

@@ -1,0 +1,73 @@
+"""What a loader holds does not grow: memory, open files, threads."""
+
+import gc
+import threading
+from pathlib import Path
+
+import pytest
+
+from wsm_data.loaders.loader import ClipLoader
+
+WARM_UP_EPOCHS, EPOCHS = 5, 20
+TOLERANCE_BYTES = 6 << 20
+"""Arenas of the allocator and caches of Python come and go by a few MB; a batch left behind every epoch, of 0.4 MB or
+more, would make 8 MB and more in 20 epochs of 6 steps."""
+
+
+def _resident_bytes() -> int:
+    gc.collect()
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * 4096
+
+
+def _open_files() -> int:
+    return len(list(Path("/proc/self/fd").iterdir()))
+
+
+def _threads() -> int:
+    return len(list(Path("/proc/self/task").iterdir()))
+
+
+def _epochs(loader: ClipLoader, count: int) -> None:
+    for _ in range(count):
+        for batch in loader:
+            assert batch.keys
+
+
+@pytest.mark.parametrize("settings", [{"threads": 0}, {"threads": 2}, {"threads": 2, "max_latents": 3}], ids=str)
+def test_memory_files_and_threads_are_constant_over_20_epochs(make_loader, settings):
+    loader = make_loader(verify="always", **settings)
+    _epochs(loader, WARM_UP_EPOCHS)
+    memory, files, threads = _resident_bytes(), _open_files(), _threads()
+    _epochs(loader, EPOCHS)
+    assert _resident_bytes() - memory < TOLERANCE_BYTES
+    assert (_open_files(), _threads()) == (files, threads)
+
+
+def test_epochs_that_are_broken_off_leave_nothing_behind(make_loader):
+    loader = make_loader(threads=2, prefetch_batches=3)
+
+    def broken_off(count: int) -> None:
+        for _ in range(count):
+            for batch in loader:
+                if batch.step == 2:
+                    break
+            loader.set_epoch(loader.state_dict()["epoch"] + 1)
+
+    broken_off(WARM_UP_EPOCHS)
+    memory, files, threads = _resident_bytes(), _open_files(), threading.active_count()
+    broken_off(EPOCHS)
+    assert _resident_bytes() - memory < TOLERANCE_BYTES
+    assert (_open_files(), threading.active_count()) == (files, threads)
+
+
+def test_few_blocks_serve_all_batches(make_loader):
+    """One the caller holds, one that is delivered, and those that are read ahead."""
+    loader = make_loader(threads=1, prefetch_batches=2, standardise=False, dtype="float16")
+    _epochs(loader, 1)
+    places = set()
+    for _ in range(6):
+        for batch in loader:
+            places.add(batch.rgb.data_ptr())
+    del batch
+    assert len(places) <= 4

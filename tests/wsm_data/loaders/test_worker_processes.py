@@ -1,0 +1,80 @@
+import os
+import signal
+from itertools import islice
+
+import pytest
+import torch
+
+from wsm_data.errors import IntegrityError
+from wsm_data.loaders.config import OrderConfig, ReadConfig, SourceConfig
+from wsm_data.loaders.source_table import open_sources
+from wsm_data.loaders.step_reader import StepReader
+from wsm_data.loaders.worker_processes import StepDataset, read_in_processes
+
+pytestmark = pytest.mark.timeout(60)
+READ = ReadConfig(workers=2, prefetch_batches=4)
+
+
+@pytest.fixture
+def dataset(released) -> StepDataset:
+    sources = open_sources([SourceConfig(release=str(released.folder))])
+    return StepDataset(StepReader(sources, READ, rank=0, world_size=1), sources.plan(OrderConfig(global_batch=4), 0))
+
+
+class Spoilt(StepDataset):
+    """Steps of which one fails, or kills the worker that reads it."""
+
+    def __init__(self, dataset: StepDataset, step: int, *, kills: bool):
+        self._dataset, self._step, self._kills = dataset, step, kills
+
+    def __getitem__(self, step: int):
+        if step == self._step and self._kills:
+            os.kill(os.getpid(), signal.SIGKILL)
+        if step == self._step:
+            raise IntegrityError("train-000003.tar, clip a/b/c: the checksum is wrong")
+        return self._dataset[step]
+
+
+def test_steps_come_in_order_whichever_worker_reads_them(dataset):
+    assert [packed.step for packed in read_in_processes(dataset, [4, 0, 3, 1], READ)] == [4, 0, 3, 1]
+
+
+def test_what_workers_read_is_what_is_read_here(dataset):
+    for packed in read_in_processes(dataset, range(3), READ):
+        own = dataset[packed.step]
+        assert packed.layout == own.layout
+        assert packed.keys == own.keys
+        for name, tensor in packed.tensors().items():
+            assert torch.equal(tensor, own.tensors()[name]), name
+        assert sum(packed.seconds.values()) > 0
+
+
+def test_an_error_of_a_worker_comes_at_its_step_with_its_words(dataset):
+    stream = read_in_processes(Spoilt(dataset, 2, kills=False), range(5), READ)
+    assert [packed.step for packed in islice(stream, 2)] == [0, 1]
+    with pytest.raises(IntegrityError, match=r"train-000003\.tar, clip a/b/c: the checksum is wrong"):
+        next(stream)
+
+
+def test_a_worker_that_dies_is_an_error_not_a_hang(dataset):
+    stream = read_in_processes(Spoilt(dataset, 1, kills=True), range(5), READ)
+    with pytest.raises(RuntimeError, match=r"(?i)worker.*(killed|exited unexpectedly)"):
+        list(stream)
+
+
+def test_workers_end_when_the_stream_is_closed(dataset):
+    stream = read_in_processes(dataset, range(5), READ)
+    next(stream)
+    children = torch.multiprocessing.active_children()
+    assert len(children) == 2
+    stream.close()
+    for child in children:
+        child.join(timeout=20)
+        assert not child.is_alive()
+
+
+def test_the_random_numbers_of_the_run_are_not_touched(dataset):
+    torch.manual_seed(0)
+    before = torch.get_rng_state()
+    list(read_in_processes(dataset, range(2), READ))
+    assert torch.equal(torch.get_rng_state(), before)
