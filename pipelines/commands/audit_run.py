@@ -8,7 +8,7 @@ import typer
 from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.loaders.audit_run import EpochAudit, audit_epochs, sightings
 from wsm_data.loaders.ledger_sources import open_recorded_sources, recorded_order, refs_of_key
-from wsm_data.loaders.ledger_timeline import Timeline, read_timeline
+from wsm_data.loaders.ledger_timeline import Timeline, read_timeline, steps_text
 from wsm_data.loaders.source_table import Sources
 from wsm_data.view.text_table import aligned
 
@@ -51,7 +51,8 @@ def audit_run(
 
 def _print_clip(timeline: Timeline, sources: Sources, key: str) -> None:
     rows = [("epoch", "step", "rank", "of", "session", "")]
-    for seen in sightings(timeline, refs_of_key(sources, key)):
+    found = sightings(timeline, refs_of_key(sources, key))
+    for seen in sorted(found, key=lambda one: (one.epoch, one.step, one.counts, one.rank)):
         place = (f"{seen.epoch:,}", f"{seen.step:,}", str(seen.rank), str(seen.world_size), seen.session)
         rows.append((*place, "" if seen.counts else "lost with its run, trained again"))
     typer.echo(aligned(rows, right=range(4)) if len(rows) > 1 else f"{key} was not delivered at any recorded step")
@@ -78,7 +79,7 @@ def _print_audit(timeline: Timeline, sources: Sources | None, folder: Path) -> N
     typer.echo(_head(timeline) + "\n\n" + _epoch_table(audits) + "\n")
     for again in timeline.again:
         typer.echo(
-            f"epoch {again.epoch}: steps {again.start} to {again.end} of session {again.session} were lost with it and "
+            f"epoch {again.epoch}: {steps_text(again.start, again.end)} of session {again.session} lost with it, and "
             "trained again"
         )
     if timeline.ahead:
@@ -123,11 +124,11 @@ def _explained(audit: EpochAudit) -> str:
     if audit.plan is None:
         return "counts fit"
     parts = (
-        (audit.plan.dropped_clips, "clips dropped"),
-        (audit.plan.repeated_rows, "rows repeated"),
-        (audit.plan.padded_rows, "rows empty"),
+        ("dropped clips", audit.plan.dropped_clips),
+        ("repeated rows", audit.plan.repeated_rows),
+        ("empty rows", audit.plan.padded_rows),
     )
-    return ", ".join(f"{count:,} {words}" for count, words in parts if count) or "every clip"
+    return ", ".join(f"{words}: {count:,}" for words, count in parts if count) or "every clip"
 
 
 def _verdict(audits: Sequence[EpochAudit], *, compared: bool) -> str:

@@ -131,6 +131,11 @@ def read_timeline(folder: Path) -> Timeline:
     )
 
 
+def steps_text(start: int, end: int) -> str:
+    """The steps from `start` on before `end`, in words that name the first and the last."""
+    return f"step {start}" if end == start + 1 else f"steps {start} to {end - 1}"
+
+
 def _read_files(folder: Path) -> tuple[LedgerFile, ...]:
     read = [read_ledger_file(path) for path in ledger_files(folder).values()]
     files = tuple(file for file in read if file is not None)
@@ -195,10 +200,11 @@ def _missing_ranks(
     for rank in range(file.world_size):
         found = latest.get(_start_of(file, segment, rank))
         if end > segment.start and (found is None or found.end < end):
-            reached = "has no such start" if found is None else f"stops at {found.end}"
+            reached = "has no such start" if found is None else f"stops before {found.end}"
             yield (
-                f"epoch {segment.epoch}: all {file.world_size} ranks must have recorded the steps {segment.start} to "
-                f"{end} from a start at {segment.start} of {segment.steps} on, but rank {rank} {reached}"
+                f"epoch {segment.epoch}: all {file.world_size} ranks must have recorded "
+                f"{steps_text(segment.start, end)} from a start at {segment.start} of {segment.steps} on, but rank "
+                f"{rank} {reached}"
             )
 
 
@@ -225,8 +231,8 @@ def _gaps(stretches: Sequence[Stretch]) -> Iterator[str]:
         if same_epoch and one.steps != following.steps:
             yield f"epoch {one.epoch}: it has {one.steps} steps, but {following.steps} from step {following.start} on"
         elif same_epoch and one.end != following.start:
-            yield f"epoch {one.epoch}: the steps {one.end} to {following.start} are in no session"
+            yield f"epoch {one.epoch}: {steps_text(one.end, following.start)} in no session"
         elif not same_epoch and one.end != one.steps:
-            yield f"epoch {one.epoch}: the steps {one.end} to {one.steps} are in no session"
+            yield f"epoch {one.epoch}: {steps_text(one.end, one.steps)} in no session"
         if not same_epoch and (following.epoch, following.start) != (one.epoch + 1, 0):
             yield f"epoch {following.epoch}: it was begun at step {following.start} after epoch {one.epoch}"

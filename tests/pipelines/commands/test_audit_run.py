@@ -47,8 +47,8 @@ def test_a_run_that_was_killed_and_resumed_is_proven(resumed, tiny, capsys):
     audit(resumed, releases=[str(tiny.folder)])
     printed = capsys.readouterr().out
     assert "world size 1, 2; 3 files" in printed
-    assert re.search(r"0 +3 +3 +6 +6 +0 +1 +1 clips dropped", printed)
-    assert "epoch 0: steps 1 to 2 of session" in printed
+    assert re.search(r"0 +3 +3 +6 +6 +0 +1 +dropped clips: 1", printed)
+    assert "epoch 0: step 1 of session" in printed
     assert printed.splitlines()[-1] == (
         "2 of 2 epochs complete, no step missing, none twice: every recorded step brought what the plan says"
     )
@@ -63,7 +63,7 @@ def test_without_the_release_the_counts_are_audited(resumed, capsys):
 
 @pytest.mark.parametrize(
     ("remainder", "explained"),
-    [(Remainder.DROP, "1 clips dropped"), (Remainder.REPEAT, "1 rows repeated"), (Remainder.PAD, "1 rows empty")],
+    [(Remainder.DROP, "dropped clips: 1"), (Remainder.REPEAT, "repeated rows: 1"), (Remainder.PAD, "empty rows: 1")],
 )
 def test_the_remainder_is_explained(tmp_path, tiny, capsys, remainder, explained):
     order = OrderConfig(global_batch=2, remainder=remainder)
@@ -89,7 +89,7 @@ def test_steps_that_were_skipped_end_with_code_4(tmp_path, tiny, capsys, compare
         app(arguments)
     assert stopped.value.code == IntegrityError.exit_code
     captured = capsys.readouterr()
-    assert "epoch 0: the steps 1 to 2 are in no session" in captured.err
+    assert "epoch 0: step 1 in no session" in captured.err
     assert "clips seen" in captured.out
 
 

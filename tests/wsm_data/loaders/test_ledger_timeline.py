@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.loaders.ledger import LedgerWriter
-from wsm_data.loaders.ledger_timeline import read_timeline
+from wsm_data.loaders.ledger_timeline import read_timeline, steps_text
 
 STEPS, BATCH = 6, 4
 
@@ -120,13 +120,13 @@ def test_a_rank_that_was_killed_before_its_head_was_whole_is_passed_over(tmp_pat
 @pytest.mark.parametrize(
     ("sessions", "message"),
     [
-        ([(2, (0, 0), (0, 3)), (2, (0, 4), (0, 6))], "epoch 0: the steps 3 to 4 are in no session"),
-        ([(2, (0, 0), (0, 3)), (2, (1, 0), (1, 6))], "epoch 0: the steps 3 to 6 are in no session"),
+        ([(2, (0, 0), (0, 3)), (2, (0, 4), (0, 6))], "epoch 0: step 3 in no session"),
+        ([(2, (0, 0), (0, 3)), (2, (1, 0), (1, 6))], "epoch 0: steps 3 to 5 in no session"),
         ([(2, (0, 0), (0, 6)), (2, (1, 2), (1, 6))], "epoch 1: it was begun at step 2 after epoch 0"),
         ([(2, (0, 0), (0, 6)), (2, (2, 0), (2, 6))], "epoch 2: it was begun at step 0 after epoch 0"),
         ([(2, (0, 2), (0, 6))], "epoch 0: the steps before 2 are not in the ledger"),
-        ([(2, (0, 0), [(0, 4), (0, 3)]), (2, (0, 4), (0, 6))], "but rank 1 stops at 3"),
-        ([(2, (0, 0), (0, 3)), (2, (0, 5), (0, 5))], "epoch 0: the steps 3 to 5 are in no session"),
+        ([(2, (0, 0), [(0, 4), (0, 3)]), (2, (0, 4), (0, 6))], "but rank 1 stops before 3"),
+        ([(2, (0, 0), (0, 3)), (2, (0, 5), (0, 5))], "epoch 0: steps 3 to 4 in no session"),
     ],
 )
 def test_what_breaks_the_course_is_said(tmp_path, sessions, message):
@@ -140,7 +140,7 @@ def test_ranks_that_started_elsewhere_do_not_count_as_one_session(tmp_path):
     run_rank(tmp_path, 1, 2, (0, 1), (0, 4))
     run_session(tmp_path, 2, (0, 4), (0, 6))
     misfits = read_timeline(tmp_path).misfits
-    assert any("the steps 0 to 4 from a start at 0 of 6 on, but rank 1 has no such start" in one for one in misfits)
+    assert any("steps 0 to 3 from a start at 0 of 6 on, but rank 1 has no such start" in one for one in misfits)
 
 
 def test_a_session_without_rank_0_is_no_course(tmp_path):
@@ -196,3 +196,7 @@ def test_whatever_is_killed_and_resumed_within_what_all_ranks_had_the_course_is_
     expected = {position(step): refs_of(*position(step), 0, 1).tolist() for step in range(reached)}
     assert delivered(timeline) == expected
     assert timeline.misfits == ()
+
+
+def test_steps_are_named_by_the_first_and_the_last():
+    assert [steps_text(3, end) for end in (4, 5, 9)] == ["step 3", "steps 3 to 4", "steps 3 to 8"]
