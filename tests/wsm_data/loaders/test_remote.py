@@ -168,6 +168,16 @@ def test_the_failure_of_one_stretch_leaves_the_others(open_reader, published, re
             assert read_clip(reader, span) == published.bytes_of(span)
 
 
+def test_what_was_announced_is_asked_for_side_by_side(open_reader, published, remote):
+    together = threading.Barrier(3)
+    remote.proxy.on_request = lambda path: together.wait(timeout=60)  # breaks, unless three are underway at once
+    reader = open_reader(fetch_threads=3)
+    separate = [spans_of_shard(published, shard.name)[0] for shard in published.manifest.shards][:3]
+    reader.expect(separate)
+    assert [read_clip(reader, span) for span in separate] == [published.bytes_of(span) for span in separate]
+    assert not together.broken
+
+
 def test_no_more_is_fetched_ahead_than_the_limit(open_reader, published, remote, monkeypatch):
     separate = [spans_of_shard(published, shard.name)[0] for shard in published.manifest.shards]
     limit = separate[0].size + separate[1].size

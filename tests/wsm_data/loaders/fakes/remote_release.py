@@ -1,6 +1,5 @@
 """A release in a local S3 (moto as a server) behind the fault proxy; all listen on free ports of the loopback."""
 
-import importlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -58,7 +57,9 @@ class Remote:
 @pytest.fixture(scope="session")
 def store_server() -> Iterator[tuple[str, int]]:
     """Host and port of an empty S3."""
-    server = importlib.import_module("moto.server").ThreadedMotoServer("127.0.0.1", 0, verbose=False)
+    from moto.server import ThreadedMotoServer  # slow to import: only tests that need a store wait for it
+
+    server = ThreadedMotoServer("127.0.0.1", 0, verbose=False)
     server.start()
     yield server.get_host_and_port()
     server.stop()
@@ -82,8 +83,10 @@ def published(store_server: tuple[str, int], tmp_path_factory: pytest.TempPathFa
 
 def upload(folder: Path, server: tuple[str, int], prefix: str = "tiny") -> None:
     """Put all files of a folder into the bucket."""
+    import boto3
+
     host, port = server
-    client = importlib.import_module("boto3").client(
+    client = boto3.client(
         "s3",
         endpoint_url=f"http://{host}:{port}",
         region_name="us-east-1",
