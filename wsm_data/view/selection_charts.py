@@ -34,7 +34,7 @@ def compared_histogram(everything: Float64Array, chosen: Float64Array, label: st
     if any(beyond):
         text = f"beyond: {' % of all, '.join(f'{share:.2g}' for share in beyond)} % of chosen"
         axes.set_title(text, loc="right", fontsize=9, fontweight="normal", color=MUTED)
-    axes.set(xlabel=label, ylabel="share of clips", xlim=(edges[0], edges[-1]))
+    axes.set(xlabel=label, ylabel="share of clips (%)", xlim=(edges[0], edges[-1]))
     axes.xaxis.set_major_locator(MaxNLocator(nbins=5))
     if share:
         axes.xaxis.set_major_formatter(FuncFormatter(_percent))
@@ -52,7 +52,7 @@ def difficulty_chart(difficulty: Float64Array, chosen: Float64Array) -> Figure:
 def leading_chart(labels: Sequence[str], counts: Sequence[int]) -> Figure:
     """How many of the chosen clips each score made hard before all others, as bars."""
     height_px = 84 + 30 * len(labels)
-    left_px = 40 + 8 * max((len(label) for label in labels), default=0)
+    left_px = 64 + 8 * max((len(label) for label in labels), default=0)
     figure = new_figure(_BROAD_PX, height_px)
     axes = figure.add_axes((left_px / _BROAD_PX, 58 / height_px, 1 - (left_px + 40) / _BROAD_PX, 1 - 66 / height_px))
     axes.barh(range(len(labels)), counts, height=0.66, color=BAR_SECOND, lw=0)
@@ -61,7 +61,7 @@ def leading_chart(labels: Sequence[str], counts: Sequence[int]) -> Figure:
         axes.annotate(text, (count, row), xytext=(6, 0), textcoords="offset points", va="center", fontsize=10)
     axes.set_yticks(range(len(labels)), list(labels))
     axes.invert_yaxis()
-    axes.set(xlabel="chosen clips (count)", ylabel="")
+    axes.set(xlabel="chosen clips (count)", ylabel="score (name)")
     axes.set_xlim(0, max(counts, default=0) * 1.2 or 1.0)
     axes.xaxis.set_major_locator(MaxNLocator(nbins=6, integer=True))
     axes.tick_params(axis="y", length=0)
@@ -84,7 +84,7 @@ def _shares(values: Float64Array, edges: Float64Array) -> Float64Array:
 
 
 def _percent(share: float, _position: int | None = None) -> str:
-    return f"{100 * share:.3g} %"
+    return f"{100 * share:.3g}%"
 
 
 def _chart() -> tuple[Figure, Axes]:

@@ -1,17 +1,24 @@
 """Small clips of a walled room, decodable by the dct codec, and a release of six of them."""
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
+import pyarrow as pa
 import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from pipelines.config import settings_of
 from wsm_data.codecs.dct import DctCodec
 from wsm_data.codecs.depth import normalise_depth
 from wsm_data.codecs.quality import CodecQuality, DepthErrors
+from wsm_data.curation.quotas import Limits, Quota, QuotaConfig
+from wsm_data.curation.rule import RuleConfig
+from wsm_data.curation.scores_table import PATH_POINTS, Direction, ScorerInfo, ScoreTable, write_scores
+from wsm_data.curation.select import INDEX_COLUMNS, SelectionConfig, select_clips
 from wsm_data.geometry.transform import invert
 from wsm_data.schema.camera import Intrinsics
 from wsm_data.schema.clip import UNREACHABLE_MM, Clip
@@ -21,8 +28,10 @@ from wsm_data.schema.identity import EpisodeId
 from wsm_data.shards.assemble import ReleaseFacts, finish_release
 from wsm_data.shards.fragment import build_fragment, fragment_path, read_fragment_info, write_fragment
 from wsm_data.shards.inventory import InventoryRow, UnitState
+from wsm_data.shards.manifest import release_digest
 from wsm_data.shards.plan import PlannedClip, plan_shards
 from wsm_data.shards.release import Release, open_release
+from wsm_data.shards.selection import Selection, selection_path, write_selection
 from wsm_data.shards.writer import write_shard
 
 CODEC = DctCodec()
@@ -222,4 +231,68 @@ def made() -> SimpleNamespace:
         start_cell=START_CELL,
         goal_cell=GOAL_CELL,
         camera_height_m=CAMERA_HEIGHT_M,
+    )
+
+
+@pytest.fixture(scope="session")
+def selected(tmp_path_factory) -> SimpleNamespace:
+    """A release with scores and three selections: `hard`, a part of it, and one of another release."""
+    units = dict.fromkeys(list(UNITS)[:4], "train") | dict.fromkeys(list(UNITS)[4:], "test")
+    release = build_release(tmp_path_factory.mktemp("selected"), units)
+    folder, digest = Path(release.store.root), release_digest(release.manifest)
+    index = release.index.columns(INDEX_COLUMNS)
+    count = len(index)
+    columns = {
+        "detour_ratio": np.linspace(1.0, 3.0, count),
+        "clearance_least_m": np.linspace(0.6, 0.2, count),
+        "retreat_m": np.where(np.asarray(index["split"].to_pylist()) == "test", np.nan, 1.0),
+    }
+    first_of_split = index["split"].to_pylist().index("train")
+    columns["retreat_m"][first_of_split] = np.nan
+    infos = tuple(
+        ScorerInfo(
+            name=name,
+            unit="m" if name.endswith("_m") else "ratio",
+            direction=Direction.LOWER if name == "clearance_least_m" else Direction.HIGHER,
+            summary=f"invented <b>bold</b> {name}",
+            absent="no dead end" if name == "retreat_m" else "",
+        )
+        for name in columns
+    )
+    keys = pa.array(index["key"].to_pylist())
+    scores = ScoreTable(release_digest=digest, scorers=infos, keys=keys, columns=columns)
+    paths = np.zeros((count, PATH_POINTS, 2), np.float32) + 10 * np.arange(count, dtype=np.float32)[:, None, None]
+    write_scores(folder / "scores.parquet", scores, paths)
+    config = SelectionConfig(
+        fraction=0.5,
+        rule=RuleConfig(weights={"detour_ratio": 3.0, "clearance_least_m": 1.0}),
+        quotas=QuotaConfig(scene=Quota(at_most=1), camera=Quota(named={"zed": Limits(at_least=1)})),
+    )
+    chosen = select_clips(index, scores, lambda rows: paths[rows], config)
+    selection = Selection(
+        name="hard",
+        release_digest=digest,
+        rule={
+            "settings": {"name": "hard", **settings_of(config)},
+            "clips": {
+                "of the split": chosen.trajectories,
+                "excluded": dict(chosen.excluded),
+                "near-duplicates left out": chosen.near_duplicates,
+                "over quota": chosen.over_quota,
+            },
+        },
+        command="wsm select RELEASE --set fraction=0.5",
+        keys=keys.take(pa.array(chosen.rows)),
+        scores=chosen.difficulty,
+        why=chosen.why,
+    )
+    part = replace(selection, name="other", **{one: getattr(selection, one)[:1] for one in ("keys", "scores", "why")})
+    for one in (selection, part, replace(selection, name="stale", release_digest="0" * 64)):
+        write_selection(folder / selection_path(one.name), one)
+    return SimpleNamespace(
+        release=release,
+        scores=str(folder / "scores.parquet"),
+        config=config,
+        selection=selection,
+        detour_of_split=columns["detour_ratio"][np.asarray(index["split"].to_pylist()) == "train"].tolist(),
     )
