@@ -6,7 +6,7 @@ from dataclasses import replace
 import torch
 
 from wsm_data.errors import ConfigError
-from wsm_data.loaders.batch import LATENT_DTYPES, Batch, PackedBatch
+from wsm_data.loaders.batch import LATENT_DTYPES, NO_SEQUENCE, Batch, PackedBatch
 from wsm_data.loaders.config import ReadConfig
 from wsm_data.loaders.standardise import Standardisation, standardisations
 from wsm_data.shards.manifest import ReleaseManifest
@@ -70,12 +70,16 @@ def on_device(
         packed: a batch with latents as they are stored.
         device: where it goes.
         dtype: dtype of the latents.
-        standardise: mean and scale of `rgb` and `depth`; without them, only the dtype changes.
+        standardise: mean and scale of `rgb` and `depth`; without them, only the dtype changes. Padding stays zero.
     """
     batch = replace(packed, block=packed.block.to(device, non_blocking=True)).unpacked()
 
+    padding = (batch.sequence_id == NO_SEQUENCE)[..., None, None, None]
+
     def finished(name: str, latents: torch.Tensor) -> torch.Tensor:
-        return standardise[name].whole(latents, dtype) if name in standardise else latents.to(dtype)
+        if name not in standardise:
+            return latents.to(dtype)
+        return standardise[name].whole(latents, dtype).masked_fill_(padding, 0)
 
     return replace(batch, rgb=finished("rgb", batch.rgb), depth=finished("depth", batch.depth))
 
