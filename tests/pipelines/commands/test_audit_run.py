@@ -112,7 +112,7 @@ def test_it_says_which_steps_saw_a_clip(resumed, tiny, capsys):
     key = sources.key(int(sources.plan(ORDER, 0).rows(1, 1, 2)[0][0]))  # of step 1, which was trained again
     audit(resumed, releases=[str(tiny.folder)], clip=key)
     rows = [line.split() for line in capsys.readouterr().out.splitlines()[1:]]
-    assert [row[:4] for row in rows if row[0] == "0"] == [["0", "1", "0", "1"], ["0", "1", "1", "2"]]
+    assert [row[:4] for row in rows if row[0] == "0"] == [["0", "1", "1", "2"], ["0", "1", "0", "1"]]
     assert {" ".join(row[5:]) for row in rows if row[3] == "2"} == {"lost with its run, trained again"}
     assert {" ".join(row[5:]) for row in rows if row[3] == "1"} == {""}
 
