@@ -12,6 +12,12 @@ from wsm_data.schema.clip import TEMPORAL_RATIO
 READ_MEMBERS = ("rgb_latent", "depth_latent", "depth_valid", "poses")
 """Members that batches are made of, in stored order."""
 
+_EACH = len(READ_MEMBERS)
+_COLUMNS = (
+    *("key", "shard", "latents", "padded_frames", "clip_offset"),
+    *(f"{name}_{what}" for what in ("offset", "size", "checksum") for name in READ_MEMBERS),
+)
+
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class ClipPlace:
@@ -71,19 +77,16 @@ def clip_places(sources: Sources, refs: np.ndarray) -> list[ClipPlace]:
         numbers = refs[own] - table.base
         if not len(own):
             continue
-        shards = table.shard_codes[numbers].tolist()
-        single = [table.column(name)[numbers].tolist() for name in ("latents", "padded_frames", "clip_offset")]
-        members = [
-            zip(*(table.column(f"{name}_{what}")[numbers].tolist() for name in READ_MEMBERS), strict=True)
-            for what in ("offset", "size", "checksum")
-        ]
-        columns = zip(own.tolist(), numbers.tolist(), table.keys(numbers), shards, *single, *members, strict=True)
-        for place, number, key, shard, latents, padded_frames, clip_offset, offsets, sizes, checksums in columns:
+        columns = [values.tolist() for values in table.values(_COLUMNS, numbers)]
+        single, members = columns[: -3 * _EACH], columns[-3 * _EACH :]
+        of_members = [zip(*members[first : first + _EACH], strict=True) for first in range(0, 3 * _EACH, _EACH)]
+        found = zip(own.tolist(), numbers.tolist(), *single, *of_members, strict=True)
+        for place, number, key, shard, latents, padded_frames, clip_offset, offsets, sizes, checksums in found:
             places[place] = ClipPlace(
                 source=source,
                 number=number,
                 key=key,
-                shard=table.shards[shard],
+                shard=shard,
                 latents=latents,
                 padded_frames=padded_frames,
                 clip_offset=clip_offset,

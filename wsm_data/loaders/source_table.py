@@ -74,9 +74,17 @@ class SourceTable:
             self._columns[name] = self._of_source(self.release.index.numbers(name))
         return self._columns[name]
 
+    def values(self, names: Sequence[str], numbers: Int64Array) -> list[np.ndarray]:
+        """Some columns of the index for some clips, by their numbers in the table; texts as arrays of objects.
+
+        Unlike `column` it holds little: what a batch needs of an index of any size.
+        """
+        return self.release.index.values(names, self.rows[np.asarray(numbers, np.int64)])
+
     def keys(self, numbers: Sequence[int] | Int64Array) -> list[str]:
         """Keys of some clips, by their numbers in the table."""
-        return self.release.index.keys_at(self.rows[np.asarray(numbers, np.int64)])
+        [keys] = self.values(["key"], np.asarray(numbers, np.int64))
+        return list(keys)
 
     def index_row(self, number: int) -> IndexRow:
         """Everything the index says of a clip, by its number in the table.
@@ -231,22 +239,24 @@ def count_duplicates(tables: Sequence[SourceTable]) -> int:
     total = 0
     for number, table in enumerate(tables):
         for earlier in tables[:number]:
-            keys = _shared_keys(earlier, table)
-            total += len(keys)
-            if keys:
+            count, key = _shared(earlier, table)
+            total += count
+            if count:
                 _LOG.warning(
                     "%d clips, such as %s, come from source %s and from source %s; an epoch brings them once for each",
-                    len(keys), keys[0], _words(earlier), _words(table),
+                    count, key, _words(earlier), _words(table),
                 )  # fmt: skip
     return total
 
 
-def _shared_keys(one: SourceTable, other: SourceTable) -> list[str]:
+def _shared(one: SourceTable, other: SourceTable) -> tuple[int, str]:
+    """How many clips two sources share, and the key of the first."""
     if one.release.digest == other.release.digest:
         rows = np.intersect1d(one.rows, other.rows, assume_unique=True)
-        return one.release.index.keys_at(rows)
-    own, others = (_content(table) for table in (one, other))
-    return [text.partition(" ")[0] for text in own.filter(pc.is_in(own, value_set=others)).to_pylist()]
+        return len(rows), one.release.index.values(["key"], rows[:1])[0][0] if len(rows) else ""
+    own, others = _content(one), _content(other)
+    shared = own.filter(pc.is_in(own, value_set=others))
+    return len(shared), shared[0].as_py().partition(" ")[0] if len(shared) else ""
 
 
 def _content(table: SourceTable) -> pa.StringArray:

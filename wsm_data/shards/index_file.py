@@ -1,22 +1,24 @@
 """index.parquet on a disk or in memory, of which only the columns and rows are read that somebody asks for."""
 
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from functools import lru_cache
+from functools import lru_cache, partial
 from itertools import accumulate
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from wsm_data.errors import IntegrityError
 from wsm_data.shards.index_row import INDEX_VERSION, SCHEMA
+from wsm_data.shards.row_blocks import RowBlocks
 
-_KEPT_GROUPS = 4
+_KEPT_CHOICES = 4  # a program asks for few choices of columns
 
 
 class IndexFile:
-    """The columns of an index file; safe to be read by several threads, and after a fork.
+    """The columns of an index file; safe to be read by several threads.
 
     Every page that is read is compared with its checksum.
 
@@ -39,7 +41,7 @@ class IndexFile:
                 raise ValueError(f"its columns must be those of docs/format.md, found {schema.names}")
         sizes = [self._metadata.row_group(number).num_rows for number in range(self._metadata.num_row_groups)]
         self._starts = [0, *accumulate(sizes)]
-        self._group = lru_cache(_KEPT_GROUPS)(self._read_group)
+        self._blocks = lru_cache(_KEPT_CHOICES)(self._make_blocks)
 
     def __len__(self) -> int:
         return int(self._metadata.num_rows)
@@ -51,20 +53,23 @@ class IndexFile:
             IntegrityError: a page is damaged.
         """
         with self._readable():
-            return self._open().read(list(names))
+            return self._open().read(list(names)).select(list(names))
 
-    def around(self, row: int) -> tuple[int, pa.Table]:
-        """All columns of a stretch of rows that holds `row`, and the first row of the stretch. A few are kept.
+    def values(self, names: Sequence[str], rows: np.ndarray) -> list[np.ndarray]:
+        """Some columns at some rows, in the order of `rows`; texts as arrays of objects. Rows around them are kept.
 
         Raises:
             IntegrityError: a page is damaged.
         """
-        group = bisect_right(self._starts, row) - 1
-        return self._starts[group], self._group(group)
+        return self._blocks(tuple(names)).values(rows)
 
-    def _read_group(self, group: int) -> pa.Table:
+    def _make_blocks(self, names: tuple[str, ...]) -> RowBlocks:
+        return RowBlocks(partial(self._read_rows, names), len(self), len(names))
+
+    def _read_rows(self, names: tuple[str, ...], start: int, end: int) -> tuple[int, pa.Table]:
+        groups = range(bisect_right(self._starts, start) - 1, bisect_left(self._starts, end))
         with self._readable():
-            return self._open().read_row_group(group)
+            return self._starts[groups[0]], self._open().read_row_groups(groups, list(names)).select(list(names))
 
     def _open(self) -> pq.ParquetFile:
         return pq.ParquetFile(self._file, metadata=self._metadata, page_checksum_verification=True)

@@ -15,8 +15,9 @@ from wsm_data.shards.names import INDEX_NAME
 
 @pytest.fixture
 def path(tiny: SimpleNamespace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The index of the seven clips in groups of two rows."""
+    """The index of the seven clips in groups of two rows, of which each is kept alone."""
     monkeypatch.setattr("wsm_data.shards.index._ROW_GROUP_ROWS", 2)
+    monkeypatch.setattr("wsm_data.shards.row_blocks._BLOCK_ROWS", 2)
     path = tmp_path / "small_groups.parquet"
     write_index(path, pq.read_table(tiny.folder / INDEX_NAME, schema=SCHEMA))
     return path
@@ -46,6 +47,10 @@ def test_groups_of_rows_give_what_the_whole_table_gives(path: Path) -> None:
     for column in ("latents", "clip_offset", "poses_checksum"):
         np.testing.assert_array_equal(lazy.numbers(column), whole.numbers(column))
         assert lazy.numbers(column).dtype == SCHEMA.field(column).type.to_pandas_dtype()
+    for rows in ([4, 1, 4, 0], []):
+        both = [index.values(["key", "shard", "latents"], np.array(rows)) for index in (lazy, whole)]
+        assert [values.tolist() for values in both[0]] == [values.tolist() for values in both[1]]
+        assert both[0][0].tolist() == [whole.texts("key")[row] for row in rows]
     for shard in whole.counts("shard"):
         assert list(lazy.rows_of_shard(shard)) == list(whole.rows_of_shard(shard))
 
