@@ -1,4 +1,4 @@
-"""A release behind a URL: the reader that its settings ask for, and the same answers as from a folder."""
+"""The reader that place and settings of a release ask for; a release behind a URL answers like one in a folder."""
 
 import re
 
@@ -9,13 +9,21 @@ from typer.testing import CliRunner
 from pipelines.cli import app
 from wsm_data.errors import IntegrityError, StoreError
 from wsm_data.loaders.cached_shards import CachedShards
-from wsm_data.loaders.config import RemoteAccess
+from wsm_data.loaders.config import ReadConfig, RemoteAccess
+from wsm_data.loaders.local_shards import LocalShards
 from wsm_data.loaders.open_shards import open_shards
 from wsm_data.loaders.remote import RangeReader
 from wsm_data.shards.release import open_release
 from wsm_data.shards.verify import verify_release
 
 TRANSIENT = (Fault.SLOW_DOWN, Fault.RESET, Fault.CUT_BODY, Fault.SHORT_BODY)
+
+
+@pytest.mark.parametrize("access", list(RemoteAccess))
+def test_a_folder_is_read_where_it_lies(published, access):
+    reader = open_shards(open_release(published.folder), ReadConfig(access=access))
+    reader.close()
+    assert type(reader) is LocalShards
 
 
 def test_ranges_are_read_unless_the_settings_ask_for_whole_shards(remote, tmp_path):
