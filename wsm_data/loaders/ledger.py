@@ -35,6 +35,7 @@ from wsm_data.loaders.ledger_files import (
     ledger_files,
     read_session,
 )
+from wsm_data.loaders.state import difference_lines
 
 _STEP_HEAD = struct.Struct("<4sIqq")  # head of a frame and fields of a step in one: this is packed for every step
 
@@ -126,15 +127,15 @@ class LedgerWriter:
         self.close()
 
 
-def _require_identity(folder: Path, identity: object) -> None:
+def _require_identity(folder: Path, identity: Mapping[str, Any]) -> None:
     """Refuse to mix two runs; the first file that has a head stands for all."""
     heads = (read_session(path) for path in ledger_files(folder).values())
     session = next((head for head in heads if head is not None), None)
-    if session is not None and session["identity"] != identity:
+    lines = difference_lines(session["identity"], identity) if session is not None else ""
+    if lines:
         raise ConfigError(
-            f"the ledger {folder} is that of another run: its sources and order are\n  "
-            f"{canonical_json(session['identity'])}\nand those of this run are\n  {canonical_json(identity)}\n"
-            "give each run a ledger of its own"
+            f"the ledger {folder} is that of a run over other sources or in another order\n{lines}\n"
+            "Give each run a ledger of its own"
         )
 
 

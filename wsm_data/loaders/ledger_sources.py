@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 
 from wsm_data.errors import ConfigError
-from wsm_data.files.jsonlines import canonical_json
 from wsm_data.files.stores import open_store
 from wsm_data.loaders.config import Arrangement, OrderConfig, Remainder, SourceConfig
 from wsm_data.loaders.query_table import QueryConfig, open_queries
 from wsm_data.loaders.source_table import Sources, open_sources
+from wsm_data.loaders.state import difference_lines
 from wsm_data.shards.manifest import release_digest
 from wsm_data.shards.release import read_manifest
 
@@ -57,12 +57,12 @@ def open_recorded_sources(identity: Mapping[str, Any], releases: Sequence[str], 
         )
     queries = identity["sources"][0].get("queries")
     sources = open_sources(configs) if queries is None else open_queries(configs, QueryConfig(**queries))
-    for stated, found in zip(identity["sources"], sources.identity(), strict=True):
-        if stated != found:
-            raise ConfigError(
-                f"the run read the clips {canonical_json(stated)}, but the releases and selections given make "
-                f"{canonical_json(found)}; give the selection of the run by --selection"
-            )
+    lines = difference_lines({"sources": identity["sources"]}, {"sources": sources.identity()})
+    if lines:
+        raise ConfigError(
+            f"the releases and selections given do not make the clips of the run\n{lines}\n"
+            "Give the selection of the run by --selection"
+        )
     return sources
 
 

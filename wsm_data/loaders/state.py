@@ -64,15 +64,19 @@ def restore(record: Mapping[str, Any], expected: LoaderState) -> tuple[int, int]
             the message says field by field what it has and what the loader has.
     """
     wanted = state_to_json(expected)
-    differences = list(_differences("", _without_position(record), _without_position(wanted)))
-    if differences:
-        lines = "\n".join(f"  {name}: saved {saved}, now {now}" for name, saved, now in differences)
+    lines = difference_lines(_without_position(record), _without_position(wanted))
+    if lines:
         raise ConfigError(
             "a saved state can only be restored over the same sources with the same settings of the order, found\n"
             f"{lines}\nGive the loader what was saved, or begin a new run without the state"
         )
     epoch, step = (_count(record, name) for name in _POSITION)
     return epoch, step
+
+
+def difference_lines(saved: Mapping[str, Any], now: Mapping[str, Any]) -> str:
+    """A line for every field in which two JSON objects differ, in the order of the names; empty where none does."""
+    return "\n".join(f"  {name}: saved {before}, now {after}" for name, before, after in _differences("", saved, now))
 
 
 def _without_position(record: Mapping[str, Any]) -> dict[str, Any]:

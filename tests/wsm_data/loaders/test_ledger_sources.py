@@ -80,7 +80,9 @@ def test_a_selection_is_found_in_its_release_or_given(tiny, tmp_path):
     (tiny.folder / selection_path("hard")).rename(place)
     assert open_recorded_sources(identity, [str(tiny.folder)], [str(place)]).identity() == sources.identity()
     write_hard(place, tiny, keys[1:4])
-    with pytest.raises(ConfigError, match="give the selection of the run by --selection"):
+    with pytest.raises(
+        ConfigError, match=r"(?s)sources\[0\]\.selection_sha256: saved .*Give the selection of the run by --selection"
+    ):
         open_recorded_sources(identity, [str(tiny.folder)], [str(place)])
 
 
