@@ -1,0 +1,50 @@
+"""Settings of a loader: what makes no sense is refused where it is written."""
+
+import pytest
+
+from wsm_data.files.retries import RequestConfig
+from wsm_data.loaders.config import Arrangement, LoaderConfig, OrderConfig, ReadConfig, SourceConfig
+
+
+@pytest.mark.parametrize("weight", [0.0, -1.0, float("nan")])
+def test_a_source_has_a_weight_above_0(weight):
+    with pytest.raises(ValueError, match="leave the source out"):
+        SourceConfig(release="release", weight=weight)
+
+
+@pytest.mark.parametrize("name", ["window_blocks", "global_batch", "pool"])
+def test_these_numbers_of_an_order_are_at_least_1(name):
+    OrderConfig(**{name: 1})
+    with pytest.raises(ValueError, match=f"{name} must be at least 1, found 0"):
+        OrderConfig(**{name: 0})
+
+
+@pytest.mark.parametrize("name", ["seed", "block_clips", "max_latents"])
+def test_these_numbers_of_an_order_are_not_negative(name):
+    OrderConfig(**{name: 0})
+    with pytest.raises(ValueError, match=f"{name} must not be negative, found -1"):
+        OrderConfig(**{name: -1})
+
+
+def test_rows_have_a_length_where_they_are_packed_and_nowhere_else():
+    OrderConfig(arrangement=Arrangement.PACK, row_latents=16)
+    for arrangement, row_latents in ((Arrangement.PACK, 0), (Arrangement.PLAIN, 16), (Arrangement.BUCKET, 16)):
+        with pytest.raises(ValueError, match="row_latents belongs to arrangement = pack"):
+            OrderConfig(arrangement=arrangement, row_latents=row_latents)
+
+
+@pytest.mark.parametrize("sizes", [(), (0,), (2, -1)])
+def test_chunks_have_at_least_one_latent(sizes):
+    with pytest.raises(ValueError, match="chunk_sizes"):
+        OrderConfig(chunk_sizes=sizes)
+
+
+def test_requests_have_the_defaults_of_the_store():
+    read, request = ReadConfig(), RequestConfig()
+    assert (read.attempts, read.first_backoff_s) == (request.attempts, request.first_backoff_s)
+    assert read.request_timeout_s == request.timeout_s
+
+
+def test_a_loader_needs_nothing_but_sources():
+    config = LoaderConfig(sources=(SourceConfig(release="release"),))
+    assert (config.order, config.read, config.ledger) == (OrderConfig(), ReadConfig(), "")
