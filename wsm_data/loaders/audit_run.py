@@ -14,7 +14,7 @@ from wsm_data.loaders.config import Arrangement, OrderConfig, Remainder
 from wsm_data.loaders.ledger_sources import recorded_order
 from wsm_data.loaders.ledger_timeline import EpochRecord, Timeline
 from wsm_data.loaders.mixing import stretch_of_epoch
-from wsm_data.loaders.plan import EpochPlan, PlanReport, plan_epoch
+from wsm_data.loaders.plan import EpochPlan, PlanReport
 from wsm_data.loaders.source_table import Sources
 from wsm_data.loaders.stable_hash import Int64Array
 
@@ -115,7 +115,7 @@ def sightings(timeline: Timeline, refs: Sequence[int]) -> Iterator[Sighting]:
 def _audit_epoch(
     record: EpochRecord, stated: Sequence[dict[str, Any]], order: OrderConfig, sources: Sources | None
 ) -> EpochAudit:
-    plan = plan_epoch(sources.layouts, order, record.epoch) if sources is not None else None
+    plan = sources.plan(order, record.epoch) if sources is not None else None
     clips = sum(source["clips"] for source in stated)
     given = [np.concatenate(refs) for _, refs in record.by_step()]
     refs = np.concatenate([np.empty(0, np.int64), *given])

@@ -1,5 +1,6 @@
 from collections import Counter
 from dataclasses import asdict
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -36,6 +37,11 @@ def record(folder, layouts, order, *, world_size=2, epochs=1, last_step=None, ch
     return read_timeline(folder)
 
 
+def sources_of(layouts):
+    """What the audit asks of sources: their plans."""
+    return SimpleNamespace(plan=partial(plan_epoch, layouts))
+
+
 def misfits(audits):
     return [misfit for audit in audits for misfit in audit.misfits]
 
@@ -70,7 +76,7 @@ def test_a_run_that_followed_its_plan_fits(
     ):
         layouts.append(layout_of(60))
     timeline = record(tmp_path_factory.mktemp("ledger"), layouts, order, epochs=2)
-    audits = audit_epochs(timeline, SimpleNamespace(layouts=layouts) if compared else None)
+    audits = audit_epochs(timeline, sources_of(layouts) if compared else None)
     assert misfits(audits) == []
     for audit in audits:
         plan = plan_epoch(layouts, order, audit.epoch)
@@ -87,7 +93,7 @@ def test_a_run_that_followed_its_plan_fits(
 
 def test_an_epoch_that_was_stopped_is_not_complete_and_fits_as_far_as_it_went(tmp_path):
     timeline = record(tmp_path, [layout_of(20)], OrderConfig(global_batch=4), epochs=2, last_step=3)
-    for sources in (None, SimpleNamespace(layouts=[layout_of(20)])):
+    for sources in (None, sources_of([layout_of(20)])):
         whole, stopped = audit_epochs(timeline, sources)
         assert (whole.complete, stopped.complete) == (True, False)
         assert (stopped.recorded, stopped.steps, stopped.seen_once) == (3, 5, 12)
@@ -122,7 +128,7 @@ def one_less(step, rank, refs):
 def test_what_does_not_fit_is_said(tmp_path, change, with_plan, with_counts):
     layouts = [layout_of(20)]
     timeline = record(tmp_path, layouts, OrderConfig(global_batch=4), change=change)
-    assert any(with_plan in misfit for misfit in misfits(audit_epochs(timeline, SimpleNamespace(layouts=layouts))))
+    assert any(with_plan in misfit for misfit in misfits(audit_epochs(timeline, sources_of(layouts))))
     found = misfits(audit_epochs(timeline, None))
     assert any(with_counts in misfit for misfit in found) if with_counts else found == []
 
@@ -138,19 +144,19 @@ def test_a_clip_may_be_missing_only_where_the_remainder_is_dropped(tmp_path, rem
     timeline = record(tmp_path, layouts, order, change=lambda step, rank, refs: refs[1:] if step == 1 else refs)
     found = misfits(audit_epochs(timeline, None))
     assert any(message in misfit for misfit in found) if message else found == []
-    assert misfits(audit_epochs(timeline, SimpleNamespace(layouts=layouts)))
+    assert misfits(audit_epochs(timeline, sources_of(layouts)))
 
 
 def test_a_plan_of_another_length_does_not_fit(tmp_path):
     timeline = record(tmp_path, [layout_of(20)], OrderConfig(global_batch=4))
-    [audit] = audit_epochs(timeline, SimpleNamespace(layouts=[layout_of(12)]))
+    [audit] = audit_epochs(timeline, sources_of([layout_of(12)]))
     assert "epoch 0: the plan has 3 steps, but the ledger says 5" in audit.misfits
 
 
 def test_many_misfits_are_counted(tmp_path):
     layouts = [layout_of(60)]
     timeline = record(tmp_path, layouts, OrderConfig(global_batch=4), change=lambda step, rank, refs: refs[::-1])
-    [audit] = audit_epochs(timeline, SimpleNamespace(layouts=layouts))
+    [audit] = audit_epochs(timeline, sources_of(layouts))
     assert len(audit.misfits) == 6
     assert audit.misfits[-1] == "epoch 0: 25 more steps do not fit the plan"
 

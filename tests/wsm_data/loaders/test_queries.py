@@ -150,9 +150,11 @@ def test_other_queries_are_another_order(driven):
         loader.load_state_dict(state)
 
 
-def test_the_ledger_of_queries_is_proven_by_their_plan(driven, tmp_path):
+@pytest.mark.parametrize("arrangement", list(Arrangement))
+def test_the_ledger_of_queries_is_proven_by_their_plan(driven, tmp_path, arrangement):
     release, _ = driven
-    with QueryLoader(config_of(release, ledger=str(tmp_path / "ledger")), TWO) as loader:
+    order = {"arrangement": arrangement, "row_latents": 24 if arrangement is Arrangement.PACK else 0}
+    with QueryLoader(config_of(release, ledger=str(tmp_path / "ledger"), **order), TWO) as loader:
         for _ in range(2):
             assert len(list(loader)) == loader.steps == loader.report.steps
     timeline = read_timeline(tmp_path / "ledger")
