@@ -137,7 +137,7 @@ class ReadConfig:
     verify: Verify = Verify.FIRST
     threads: int = 2
     workers: int = 0
-    prefetch_batches: int = 3
+    prefetch_batches: int = 2
     standardise: bool = True
     dtype: str = "float32"
     device: str = "cpu"

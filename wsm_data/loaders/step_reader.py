@@ -1,5 +1,6 @@
 """One step of one rank: its clips read into one block of memory, checked, standardised, and described."""
 
+import logging
 import threading
 from collections.abc import Mapping, Sequence
 from functools import partial
@@ -25,6 +26,7 @@ from wsm_data.loaders.timing import Part, Stopwatch
 from wsm_data.loaders.transfer import device_of
 from wsm_data.loaders.verification import Verification
 
+_LOG = logging.getLogger(__name__)
 _STORED = torch.float16
 
 
@@ -55,9 +57,11 @@ class StepReader:
         self._latent_shape = (codec.channels, *cells)
         self._dtype = _STORED if as_stored else LATENT_DTYPES[read.dtype]
         self._standardise = standardisations(manifest) if read.standardise and not as_stored else {}
+        if self._standardise and len({table.release.store.root for table in sources.tables}) > 1:
+            _LOG.warning("latents of all sources are standardised by the statistics of the first, %s", manifest.name)
         self._converts = self._dtype is not _STORED or bool(self._standardise)
         self._verification = Verification(read.verify, [len(table) for table in sources.tables])
-        self._pool = BufferPool(keep=read.prefetch_batches + 2, pinned=read.pin_memory)
+        self._pool = BufferPool(keep=read.prefetch_batches + 1, pinned=read.pin_memory)
         self._staging = threading.local()
         self._readers = open_readers(sources, read)
         self._looking_ahead = [item for item in dict.fromkeys(self._readers) if not isinstance(item, LocalShards)]
