@@ -254,7 +254,9 @@ def _work(job: _Job, selected: Sequence[Unit]) -> None:
     with (
         tqdm(total=len(selected), desc=job.stage.name, unit="unit", disable=hidden, dynamic_ncols=True) as bar,
         ledger_appender(job.out) as append,
-        closing(job.engine(_batches(selected), work, job.options.workers)) as outcomes,  # no worker outlives the lock
+        closing(
+            job.engine(_batches(selected, job.options.workers), work, job.options.workers)
+        ) as outcomes,  # no worker outlives the lock
     ):
         for outcome in outcomes:
             job.ledger[outcome.unit] = append(LedgerEntry(key=job.keys[outcome.unit], outcome=outcome))
@@ -276,12 +278,16 @@ def _keep_to_budget(job: _Job, count: RefusalCount, extra: Sequence[Refusal] = (
     )
 
 
-def _batches(units: Sequence[Unit]) -> list[list[Unit]]:
-    """Units of one batch together, batches in the order in which they first appear."""
+def _batches(units: Sequence[Unit], workers: int) -> list[list[Unit]]:
+    """Units of one batch together, batches in the order in which they first appear.
+
+    For several workers those of most units come first, so that none is left with a large one at the end.
+    """
     batches: dict[tuple[str, str], list[Unit]] = {}
     for unit in units:
         batches.setdefault(("batch", unit.batch) if unit.batch else ("unit", unit.id), []).append(unit)
-    return list(batches.values())
+    ordered = list(batches.values())
+    return sorted(ordered, key=len, reverse=True) if workers > 1 else ordered
 
 
 def _process_batch(stage: Stage[Any], config: Any, context: StageContext, batch: Sequence[Unit]) -> Iterator[Outcome]:

@@ -5,6 +5,8 @@ Loads the stages that read frames, with their libraries, and has the compiled ke
 room of a few cells. What is missing here is loaded where it is needed: this is about time alone.
 """
 
+import gc
+
 import cv2
 import numpy as np
 import simplejpeg
@@ -92,3 +94,5 @@ def _intrinsics() -> Intrinsics:
 
 _use_frame_kernels()
 _use_map_kernels()
+gc.collect()
+gc.freeze()  # a worker's collector passes over what was loaded here, and its pages stay shared with the other workers

