@@ -33,7 +33,8 @@ PATH_POINTS = 32
 """Points of a path's outline."""
 
 _METADATA_KEY = b"wsm.scores"
-_ROW_GROUP_ROWS = 1 << 20
+_ROW_GROUP_ROWS = 1 << 17
+"""What is read at a time where outlines are asked for: 32 MB of them."""
 _SHOWN_CLIPS = 3
 
 
