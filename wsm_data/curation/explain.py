@@ -32,12 +32,14 @@ class ExplainedScore:
     Attributes:
         info: the score.
         weight: its weight in the rule.
+        emphasis: exponent of its percentile in the rule.
         values: float64 [n]; NaN where a clip has none.
         percentiles: share of clips that are easier; float32 [n]; NaN likewise.
     """
 
     info: ScorerInfo
     weight: float
+    emphasis: float
     values: Float64Array
     percentiles: Float32Array
 
@@ -84,9 +86,10 @@ def score_label(info: ScorerInfo) -> str:
 
 
 def _shares(scores: Sequence[ExplainedScore]) -> Float64Array:
-    """Weighted percentile of each score, float64 [n, scores]; below all others where a clip has no value."""
+    """What each score adds to the difficulty, float64 [n, scores]; below all others where a clip has no value."""
     return np.stack(
-        [np.nan_to_num(one.percentiles.astype(np.float64) * one.weight, nan=-1.0) for one in scores], axis=1
+        [np.nan_to_num(one.percentiles.astype(np.float64) ** one.emphasis * one.weight, nan=-1.0) for one in scores],
+        axis=1,
     )
 
 

@@ -34,6 +34,9 @@ reported there on others."""
 MODEL_ORDER = ("rollout_unsafe_share", "rollout_mean_cost_m2")
 """Recommended for `lexicographic` once a policy was rolled out: how often it is unsafe, and then what it costs."""
 
+MAX_EMPHASIS = 64.0
+"""Beyond this a mean is the largest percentile but for rounding."""
+
 
 class RuleKind(StrEnum):
     """How scores become one number."""
@@ -47,17 +50,23 @@ class RuleConfig:
     """What hard means.
 
     Attributes:
-        kind: `weighted`: the weighted mean of the percentiles of `weights`. `lexicographic`: by the first score of
+        kind: `weighted`: a weighted mean of the percentiles of `weights`. `lexicographic`: by the first score of
             `order`, clips that are equal in it by the second one, and so on.
         weights: weight of each score, above 0; only for `weighted`. Given weights replace the default ones.
+        emphasis: exponent k of the mean (sum w p^k / sum w)^(1/k); only for `weighted`. 1 is the plain mean. The larger
+            it is, the more a clip is as hard as its hardest score, however easy it is by the others: a narrow door is
+            hard on a short and straight way too.
         order: scores by importance; only for `lexicographic`.
     """
 
     kind: RuleKind = RuleKind.WEIGHTED
     weights: Mapping[str, float] = field(default_factory=lambda: GEOMETRY_WEIGHTS)
+    emphasis: float = 4.0
     order: tuple[str, ...] = MODEL_ORDER
 
     def __post_init__(self) -> None:
+        if not (1 <= self.emphasis <= MAX_EMPHASIS):
+            raise ValueError(f"emphasis must lie in [1, {MAX_EMPHASIS:g}], found {self.emphasis}")
         for name, weight in self.weights.items():
             if not (0 < weight < np.inf):
                 raise ValueError(
@@ -110,7 +119,7 @@ def rate_clips(scores: ScoreTable, config: RuleConfig, rows: NDArray[np.int64] |
     percentiles = {one.name: hardness_percentiles(_column(scores, one.name, rows), one.direction) for one in infos}
     ranked = list(percentiles.values())
     if config.kind is RuleKind.WEIGHTED:
-        difficulty = _weighted_mean(ranked, list(config.weights.values()))
+        difficulty = _weighted_mean(ranked, list(config.weights.values()), config.emphasis)
     else:
         difficulty = _lexicographic(ranked)
     unrated = np.isnan(difficulty)
@@ -158,15 +167,16 @@ def _require_score(scores: ScoreTable, name: str) -> ScorerInfo:
     return infos[name]
 
 
-def _weighted_mean(percentiles: Sequence[Float64Array], weights: Sequence[float]) -> Float64Array:
-    """Mean over the scores a clip has; NaN where it has none."""
+def _weighted_mean(percentiles: Sequence[Float64Array], weights: Sequence[float], emphasis: float) -> Float64Array:
+    """Power mean over the scores a clip has; NaN where it has none."""
     total = np.zeros(len(percentiles[0]))
     weight_of_all = np.zeros(len(percentiles[0]))
     for values, weight in zip(percentiles, weights, strict=True):
         known = ~np.isnan(values)
-        total += np.where(known, values, 0.0) * weight
+        total += np.where(known, values, 0.0) ** emphasis * weight
         weight_of_all += known * weight
-    return np.divide(total, weight_of_all, out=np.full(len(total), np.nan), where=weight_of_all > 0)
+    mean = np.divide(total, weight_of_all, out=np.full(len(total), np.nan), where=weight_of_all > 0)
+    return np.asarray(mean ** (1 / emphasis))
 
 
 def _lexicographic(percentiles: Sequence[Float64Array]) -> Float64Array:

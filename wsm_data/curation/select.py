@@ -143,6 +143,7 @@ def explained_scores(
         ExplainedScore(
             info=infos[name],
             weight=weight,
+            emphasis=rule.emphasis,
             values=scores.columns[name][rated[of]],
             percentiles=rating.percentiles[name][of],
         )

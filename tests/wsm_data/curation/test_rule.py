@@ -1,18 +1,19 @@
 import numpy as np
+import pyarrow as pa
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from wsm_data.curation.rule import GEOMETRY_WEIGHTS, RuleConfig, RuleKind, hardness_percentiles, rate_clips
 from wsm_data.curation.score_clip import CLIP_SCORES
-from wsm_data.curation.scores_table import Direction
+from wsm_data.curation.scores_table import Direction, ScorerInfo, ScoreTable
 from wsm_data.errors import ConfigError
 
 VALUES = st.lists(st.one_of(st.integers(-3, 3).map(float), st.just(np.nan)), min_size=1, max_size=30)
 
 
 def weighted(**weights):
-    return RuleConfig(weights=weights)
+    return RuleConfig(weights=weights, emphasis=1.0)
 
 
 def lexicographic(*order):
@@ -51,6 +52,31 @@ def test_a_weighted_rule_is_the_mean_of_the_percentiles_with_the_hard_end_of_eac
     detour, ease = np.array([1, 3, 5, 7]) / 8, np.array([7, 1, 3, 5]) / 8
     np.testing.assert_allclose(rating.difficulty, (3 * detour + ease) / 4)
     np.testing.assert_allclose(rating.percentiles["ease_m"], ease)
+
+
+@given(VALUES.filter(lambda values: not np.isnan(values).any()), st.sampled_from([1.0, 2.0, 4.0, 16.0]))
+def test_with_emphasis_a_clip_is_rated_between_its_plain_mean_and_its_hardest_score(values, emphasis):
+    columns = {"a": np.array(values), "b": -np.array(values), "c": np.zeros(len(values))}
+    infos = tuple(ScorerInfo(name=one, unit="m", direction=Direction.HIGHER, summary="") for one in columns)
+    scores = ScoreTable(
+        release_digest="d",
+        scorers=infos,
+        keys=pa.array([str(number) for number in range(len(values))]),
+        columns=columns,
+    )
+    weights = {"a": 1.0, "b": 2.0, "c": 0.5}
+    plain, found = (rate_clips(scores, RuleConfig(weights=weights, emphasis=one)) for one in (1.0, emphasis))
+    ranks = np.stack([found.percentiles[name] for name in weights]).astype(float)
+    expected = (np.array([1.0, 2.0, 0.5]) @ ranks**emphasis / 3.5) ** (1 / emphasis)
+    np.testing.assert_allclose(found.difficulty, expected, rtol=1e-6)  # percentiles are given as float32
+    assert (found.difficulty >= plain.difficulty - 1e-12).all()
+    assert (found.difficulty <= ranks.max(axis=0) + 1e-6).all()
+
+
+@pytest.mark.parametrize("emphasis", [0.5, -1.0, 65.0])
+def test_an_emphasis_that_is_no_mean_is_refused(emphasis):
+    with pytest.raises(ValueError, match=r"emphasis must lie in \[1, 64\]"):
+        RuleConfig(emphasis=emphasis)
 
 
 def test_a_score_that_a_clip_does_not_have_is_left_out_of_its_mean(make_scores):
