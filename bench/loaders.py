@@ -8,6 +8,7 @@ environments and clips (4 GB) are made on first use, in a folder that git ignore
 """
 
 import argparse
+import sys
 import tempfile
 from contextlib import ExitStack
 from pathlib import Path
@@ -100,11 +101,13 @@ def run(cache: Path, rounds: int) -> dict[str, Any]:
         contest = Contest(cache, processes)
         rates, memory = {}, {}
         for comparison, kind in COMPARISONS.items():
+            print(comparison, file=sys.stderr)
             names = [name for name in ENTRIES if takes_part(name, **kind)]
             rates[comparison] = compare(contest, names, rounds, **kind)
             if not memory:  # after the first comparison, in one process
                 memory = {name: contest.running(name).ask("memory") for name in names if name not in LIMITS}
         processes.close()
+        print("first batches", file=sys.stderr)
         return {
             "clips_per_s": rates,
             "memory_mb": memory,

@@ -287,5 +287,27 @@ def train(
     _load("train").train(release, out, config, assignments, dry_run, quiet)
 
 
+bench = typer.Typer(help="Measure a part of the pipeline on this machine.", no_args_is_help=True)
+app.add_typer(bench, name="bench")
+
+
+@bench.command("loader")
+def bench_loader(
+    release: ReleaseArgument,
+    assignments: Annotated[
+        list[str] | None,
+        typer.Option("--set", "-s", help="One setting, as read.threads=4, order.global_batch=16, source.split=test."),
+    ] = None,
+    batches: Annotated[int, typer.Option("--batches", min=1, help="Batches to take at most.")] = 1000,
+    seconds: Annotated[float, typer.Option("--seconds", min=0.1, help="Time to measure at most, s.")] = 5.0,
+    step_ms: Annotated[
+        float, typer.Option("--step-ms", min=0, help="Time a training step takes, ms; 0: take batches as they come.")
+    ] = 0.0,
+    sweep: Annotated[bool, typer.Option("--sweep", help="Compare 1, 2 and 4 threads too.")] = False,
+) -> None:
+    """The loader doctor: run the real loader, say what holds it up and what to change."""
+    _load("bench").bench_loader(release, assignments or [], batches, seconds, step_ms / 1000, sweep)
+
+
 if __name__ == "__main__":
     app()
