@@ -9,7 +9,7 @@ from wsm_data.files.digest import xxh3_128
 from wsm_data.readers.assemble import digest_frames
 from wsm_data.readers.containers import Container, Layout
 from wsm_data.readers.members import iter_members
-from wsm_data.readers.unreadable import refusing_unreadable
+from wsm_data.readers.unreadable import read_file
 from wsm_data.schema.episode import EpisodeRecord
 
 
@@ -51,16 +51,11 @@ def iter_episode_frames(
 def _from_folder(root: Path, records: Sequence[EpisodeRecord]) -> Iterator[tuple[EpisodeRecord, EpisodeFrames]]:
     for record in records:
         try:
-            rgb = tuple(_image(root, name, record.container) for name in record.rgb_members)
-            depth = tuple(_image(root, name, record.container) for name in record.depth_members)
+            rgb = tuple(read_file(f"{root}/{name}", f"{record.container}:{name}") for name in record.rgb_members)
+            depth = tuple(read_file(f"{root}/{name}", f"{record.container}:{name}") for name in record.depth_members)
         except DataError as error:
             raise _changed(record.container, error.message) from error
         yield record, _verified(record, EpisodeFrames(rgb=rgb, depth=depth))
-
-
-def _image(root: Path, name: str, container: str) -> bytes:
-    with refusing_unreadable(f"{container}:{name}"):
-        return (root / name).read_bytes()
 
 
 def _from_archive(

@@ -8,7 +8,7 @@ from pathlib import Path
 from wsm_data.errors import DataError, Reason
 from wsm_data.readers.containers import CONTENT_FOLDERS, SCENE_CLOUD, Container, Layout, is_unfinished
 from wsm_data.readers.tar_walk import Member, walk_tar
-from wsm_data.readers.unreadable import refusing_unreadable
+from wsm_data.readers.unreadable import read_file, refusing_unreadable
 
 _READ_FOLDER = re.compile(r"data|meta|videos|(data|videos)/[^/]+|videos/[^/]+/observation\.images\.(rgb|depth)")
 
@@ -34,7 +34,7 @@ def scene_cloud(source: Path, container: Container) -> Member | None:
     path = (source / container.path).parent / SCENE_CLOUD
     if not os.path.lexists(path):
         return None
-    return _member(path, f"../{SCENE_CLOUD}", f"{container.id}:../{SCENE_CLOUD}")
+    return _member(str(path), f"../{SCENE_CLOUD}", f"{container.id}:../{SCENE_CLOUD}")
 
 
 def _from_folder(root: Path, where: str, wanted: Callable[[str], bool]) -> Iterator[Member]:
@@ -43,7 +43,7 @@ def _from_folder(root: Path, where: str, wanted: Callable[[str], bool]) -> Itera
     for content in (name for name in CONTENT_FOLDERS if name in present):
         for name in _walk(root, content, where):
             if wanted(name):
-                yield _member(root / name, name, f"{where}:{name}")
+                yield _member(f"{root}/{name}", name, f"{where}:{name}")
             elif _READ_FOLDER.fullmatch(name):
                 with refusing_unreadable(f"{where}:{name}"):
                     (root / name).stat()
@@ -67,10 +67,9 @@ def _walk(root: Path, content: str, where: str) -> Iterator[str]:
         yield from (f"{prefix}/{file}" for file in sorted(files))
 
 
-def _member(path: Path, name: str, where: str) -> Member:
+def _member(path: str, name: str, where: str) -> Member:
     try:
-        with refusing_unreadable(where):
-            data = path.read_bytes()
+        data = read_file(path, where)
     except DataError as refusal:
         return Member(name, 0, memoryview(b""), refusal)
     return Member(name, len(data), memoryview(data))

@@ -1,6 +1,5 @@
 import errno
 import os
-from pathlib import Path
 
 import pytest
 
@@ -101,9 +100,9 @@ def test_an_image_that_can_no_longer_be_read_is_named(build, tmp_path, dataset, 
     (container,) = find_containers(tmp_path, dataset)
     records = scan_container(tmp_path, container, dataset, 10).records
 
-    def failing(path):
+    def failing(path, *_args, **_options):
         raise OSError(number, os.strerror(number), str(path))
 
-    monkeypatch.setattr(Path, "read_bytes", failing)
+    monkeypatch.setattr("builtins.open", failing)
     with pytest.raises(IntegrityError, match=r"episode_000000_000\.jpg"):
         list(iter_episode_frames(tmp_path, container, records))

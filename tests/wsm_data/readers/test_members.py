@@ -1,6 +1,5 @@
 import errno
 import os
-from pathlib import Path
 
 import pytest
 
@@ -93,14 +92,14 @@ def test_a_full_disk_is_no_refusal(build, tmp_path, scan_all, monkeypatch):
 
 
 def fail_to_read(monkeypatch, name, number):
-    read_bytes = Path.read_bytes
+    plain_open = open
 
-    def failing(path):
-        if path.name == name:
+    def failing(path, *args, **options):
+        if str(path).endswith(f"/{name}"):
             raise OSError(number, os.strerror(number), str(path))
-        return read_bytes(path)
+        return plain_open(path, *args, **options)
 
-    monkeypatch.setattr(Path, "read_bytes", failing)
+    monkeypatch.setattr("builtins.open", failing)
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@ import errno
 import pytest
 
 from wsm_data.errors import DataError, Reason
-from wsm_data.readers.unreadable import refusing_unreadable
+from wsm_data.readers.unreadable import read_file, refusing_unreadable
 
 
 @pytest.mark.parametrize("number", [errno.ENOENT, errno.EACCES, errno.EIO, errno.ESTALE, errno.ELOOP])
@@ -20,3 +20,13 @@ def test_what_the_machine_lacks_is_not_the_files_fault(number):
     with pytest.raises(OSError, match="no more") as caught, refusing_unreadable("a"):
         raise OSError(number, "no more")
     assert caught.value.errno == number
+
+
+def test_a_file_is_read_whole_or_refused_by_name(tmp_path):
+    content = bytes(range(256)) * 5000
+    (tmp_path / "a.jpg").write_bytes(content)
+    assert read_file(f"{tmp_path}/a.jpg", "scene:a.jpg") == content
+    for name in ("b.jpg", "."):  # absent, and a folder
+        with pytest.raises(DataError, match="scene:b") as caught:
+            read_file(f"{tmp_path}/{name}", "scene:b")
+        assert caught.value.reason is Reason.FILE_UNREADABLE
