@@ -74,35 +74,45 @@ def test_a_stretch_may_be_read_in_pieces(open_reader, published, remote):
     assert len(remote.proxy.requests(span.shard)) == 1
 
 
-@pytest.mark.parametrize("fault", PASSING)
 @pytest.mark.parametrize("is_announced", [True, False])
-def test_faults_that_pass_change_nothing(open_reader, published, remote, fault, is_announced):
-    reader = open_reader()
-    remote.proxy.spoil(r"\.tar", fault, times=3)
-    spans = published.spans[::5]
+@pytest.mark.parametrize(
+    "faults", [PASSING, *(pytest.param([fault] * 3, marks=pytest.mark.slow) for fault in PASSING)], ids=" ".join
+)
+def test_faults_that_pass_change_nothing(open_reader, published, remote, faults, is_announced):
+    reader = open_reader(attempts=len(PASSING) + 1)
+    for fault in faults:
+        remote.proxy.spoil(r"\.tar", fault)
+    spans = published.spans[::3]
     if is_announced:
         reader.expect(spans)
     assert [read_clip(reader, span) for span in spans] == [published.bytes_of(span) for span in spans]
-    assert remote.proxy.spoiled() == 3
+    assert remote.proxy.spoiled() == len(faults)
 
 
-@pytest.mark.parametrize("is_announced", [True, False])
-def test_a_hanging_server_is_given_up_and_asked_again(open_reader, published, remote, is_announced):
+def test_a_hanging_server_is_given_up_and_asked_again(open_reader, published, remote):
     reader = open_reader(request_timeout_s=0.3)
     span = published.spans[0]
     remote.proxy.spoil(span.shard, Fault.HANG)
-    if is_announced:
-        reader.expect([span])
+    reader.expect([span])
     assert read_clip(reader, span) == published.bytes_of(span)
 
 
 @pytest.mark.parametrize("is_announced", [True, False])
-@pytest.mark.parametrize("fault", [*PASSING, Fault.HANG])
+@pytest.mark.parametrize(
+    "fault",
+    [
+        Fault.RESET,
+        Fault.HANG,
+        *(
+            pytest.param(fault, marks=pytest.mark.slow)
+            for fault in PASSING
+            if fault not in (Fault.RESET, Fault.TRICKLE)
+        ),
+    ],
+)
 def test_a_fault_that_lasts_is_an_error_that_names_object_attempts_and_cause(
     open_reader, published, remote, fault, is_announced
 ):
-    if fault is Fault.TRICKLE:
-        pytest.skip("is slow, and completes")
     reader = open_reader(attempts=3, request_timeout_s=0.5 if fault is Fault.HANG else 10.0)
     span = published.spans[7]
     remote.proxy.spoil(span.shard, fault, FOREVER)

@@ -6,7 +6,7 @@ import subprocess
 import sys
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wsm_data.errors import ConfigError
@@ -208,6 +208,7 @@ def test_what_a_killed_download_left_makes_way_for_others(killed_download, cache
     assert names(tmp_path / "cache") == [shard(0).name, shard(1).name, shard(2).name]
 
 
+@settings(max_examples=40)
 @given(
     st.lists(
         st.tuples(st.sampled_from(["put", "begin", "end", "read", "remove"]), st.integers(0, 5), st.booleans()),
