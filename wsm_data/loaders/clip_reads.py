@@ -4,9 +4,10 @@ The members that a batch needs stand one after the other in the shard, with thei
 read puts each of them where it belongs; what lies between goes into memory that nobody looks at.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from math import prod
+from operator import add, itemgetter
 
 import numpy as np
 import xxhash
@@ -56,66 +57,73 @@ def read_clip(
         IntegrityError: the shard is missing or ends too early, its bytes are not those that the index vouches for, or
             the index places members where they cannot be; names shard and clip.
     """
-    shapes = _shapes(place.latents, latent_shape)
-    _require_sound(place, shapes)
-    headers = [_memory(size) for size in place.gaps] if checked else [_NOTHING] * len(slots)
-    tails = [_memory(size) for size in _tail_sizes(place, slots, checked)]
+    shapes, sizes = _shapes_and_sizes(place.latents, latent_shape)
+    _require_sound(place, sizes)
+    if checked:
+        tails = _read_checked(reader, place, shapes, slots, watch)
+    else:
+        tails = _last_pose(place, slots)
+        with watch.measure(Part.STORE):
+            _fill(reader, place, _pieces(place, (), slots, tails))
+    return np.frombuffer((tails[-1] if tails[-1].nbytes else slots[-1])[-POSE_BYTES:], STORED_DTYPES["poses"])
+
+
+def _read_checked(
+    reader: ShardReader,
+    place: ClipPlace,
+    shapes: Sequence[tuple[int, ...]],
+    slots: Sequence[memoryview],
+    watch: Stopwatch,
+) -> list[memoryview]:
+    """Read members to their end, with their headers, and compare both; returns what lies behind each slot."""
+    headers = [memoryview(bytearray(size)) for size in place.gaps]
+    tails = [memoryview(bytearray(size - slot.nbytes)) for size, slot in zip(place.sizes, slots, strict=True)]
     for reads in range(1, MAX_READS + 1):
         with watch.measure(Part.STORE):
             _fill(reader, place, _pieces(place, headers, slots, tails))
-        if not checked:
-            break
         with watch.measure(Part.CHECKSUM):
             damage = next(_damage(place, shapes, headers, slots, tails), None)
         if damage is None:
             break
         if not reader.forget(place.shard) or reads == MAX_READS:
             raise IntegrityError(f"{place.where}: {damage}; fetch the shard again, or run `wsm verify` for the extent")
-    last = tails[-1] if tails[-1].nbytes else slots[-1]
-    return np.frombuffer(last[-POSE_BYTES:], STORED_DTYPES["poses"])
+    return tails
+
+
+def _last_pose(place: ClipPlace, slots: Sequence[memoryview]) -> list[memoryview]:
+    """Memory for the one thing that is needed behind a prefix: the pose at the end of the clip."""
+    size = min(place.sizes[-1] - slots[-1].nbytes, POSE_BYTES)
+    return [_NOTHING, _NOTHING, _NOTHING, memoryview(bytearray(size))]
 
 
 @lru_cache(maxsize=4096)
-def _shapes(latents: int, latent_shape: tuple[int, int, int]) -> tuple[tuple[int, ...], ...]:
-    """Shape of each member that is read of a clip of so many latents."""
+def _shapes_and_sizes(
+    latents: int, latent_shape: tuple[int, int, int]
+) -> tuple[tuple[tuple[int, ...], ...], tuple[int, ...]]:
+    """Shape, and bytes, of each member that is read of a clip of so many latents."""
     axes = dict(zip("FChwT", (latents, *latent_shape, frames_of(latents)), strict=True))
-    return tuple(shape_of(name, axes) for name in READ_MEMBERS)
-
-
-@lru_cache(maxsize=4096)
-def _sizes(shapes: tuple[tuple[int, ...], ...]) -> tuple[int, ...]:
-    """Bytes of each member that is read."""
-    return tuple(prod(shape) * STORED_DTYPES[name].itemsize for name, shape in zip(READ_MEMBERS, shapes, strict=True))
-
-
-def _memory(size_bytes: int) -> memoryview:
-    return memoryview(bytearray(size_bytes)) if size_bytes else _NOTHING
-
-
-def _tail_sizes(place: ClipPlace, slots: Sequence[memoryview], checked: bool) -> list[int]:
-    """Bytes behind each slot that are read too: all that a checksum covers, or the last pose alone."""
-    rests = [size - slot.nbytes for size, slot in zip(place.sizes, slots, strict=True)]
-    return rests if checked else [0, 0, 0, min(rests[-1], POSE_BYTES)]
+    shapes = tuple(shape_of(name, axes) for name in READ_MEMBERS)
+    sizes = (prod(shape) * STORED_DTYPES[name].itemsize for name, shape in zip(READ_MEMBERS, shapes, strict=True))
+    return shapes, tuple(sizes)
 
 
 def _pieces(
     place: ClipPlace, headers: Sequence[memoryview], slots: Sequence[memoryview], tails: Sequence[memoryview]
-) -> Iterator[tuple[int, memoryview]]:
+) -> list[tuple[int, memoryview]]:
     """What is read: offset in the shard and memory for it, in the order of the offsets."""
-    for offset, size, header, slot, tail in zip(place.offsets, place.sizes, headers, slots, tails, strict=True):
-        yield offset - header.nbytes, header
-        yield offset, slot
-        yield offset + size - tail.nbytes, tail
+    pieces = list(zip(place.offsets, slots, strict=True))
+    pieces += [(offset - header.nbytes, header) for offset, header in zip(place.offsets, headers, strict=False)]
+    ends = map(add, place.offsets, place.sizes)
+    pieces += [(end - tail.nbytes, tail) for end, tail in zip(ends, tails, strict=True) if tail.nbytes]
+    return sorted(pieces, key=itemgetter(0))
 
 
-def _fill(reader: ShardReader, place: ClipPlace, pieces: Iterable[tuple[int, memoryview]]) -> None:
+def _fill(reader: ShardReader, place: ClipPlace, pieces: Sequence[tuple[int, memoryview]]) -> None:
     """Read pieces that stand close together at once, with what lies between them."""
     start = end = place.clip_offset
     buffers: list[memoryview] = []
     try:
         for offset, buffer in pieces:
-            if not buffer.nbytes:
-                continue
             if offset - end > MAX_GAP_BYTES and buffers:
                 reader.read_into(place.shard, start, buffers)
                 buffers = []
@@ -157,10 +165,10 @@ def _checksum(slot: memoryview, tail: memoryview) -> int:
     return state.intdigest()
 
 
-def _require_sound(place: ClipPlace, shapes: tuple[tuple[int, ...], ...]) -> None:
+def _require_sound(place: ClipPlace, sizes: tuple[int, ...]) -> None:
     """The index must give the members the sizes of a clip, one behind the other, with room for headers between them."""
     gaps = place.gaps
-    if place.sizes != _sizes(shapes) or min(gaps) <= 0 or max(gaps) > MAX_GAP_BYTES:
+    if place.sizes != sizes or min(gaps) <= 0 or max(gaps) > MAX_GAP_BYTES:
         raise IntegrityError(
             f"{place.where}: {INDEX_NAME} places members where a clip of {place.latents} latents does not have them, "
             f"at {place.offsets} with {place.sizes} bytes; restore the index"
