@@ -148,8 +148,8 @@ def report(scoring: dict[str, float], selecting: dict[int, dict[str, object]]) -
         f"hours of one core (standard error {hours['standard error s']:.2f}); reading the clips is not counted.",
         "",
         f"`wsm select RELEASE` as a cold process: {len(CLIP_SCORES)} scores a clip in the file, "
-        f"{len(GEOMETRY_WEIGHTS)} in the rule, the hardest 10 % of the training split, near-duplicates within 0.5 m left out. Every round wrote "
-        "the same bytes.",
+        f"{len(GEOMETRY_WEIGHTS)} in the rule, the hardest 10 % of the training split, near-duplicates within 0.5 m "
+        "left out. Every round wrote the same bytes.",
         "",
         *table(["clips", "chosen", "near-duplicates", "time", "peak memory"], [row(*one) for one in selecting.items()]),
         "",

@@ -12,6 +12,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
+from wsm_data.curation.rule import power
 from wsm_data.curation.scores_table import Direction, ScorerInfo
 from wsm_data.schema.arrays import Float32Array, Float64Array
 
@@ -39,7 +40,7 @@ class ExplainedScore:
 
     info: ScorerInfo
     weight: float
-    emphasis: float
+    emphasis: int
     values: Float64Array
     percentiles: Float32Array
 
@@ -88,7 +89,10 @@ def score_label(info: ScorerInfo) -> str:
 def _shares(scores: Sequence[ExplainedScore]) -> Float64Array:
     """What each score adds to the difficulty, float64 [n, scores]; below all others where a clip has no value."""
     return np.stack(
-        [np.nan_to_num(one.percentiles.astype(np.float64) ** one.emphasis * one.weight, nan=-1.0) for one in scores],
+        [
+            np.nan_to_num(power(one.percentiles.astype(np.float64), one.emphasis) * one.weight, nan=-1.0)
+            for one in scores
+        ],
         axis=1,
     )
 

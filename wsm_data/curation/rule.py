@@ -34,8 +34,9 @@ reported there on others."""
 MODEL_ORDER = ("rollout_unsafe_share", "rollout_mean_cost_m2")
 """Recommended for `lexicographic` once a policy was rolled out: how often it is unsafe, and then what it costs."""
 
-MAX_EMPHASIS = 64.0
-"""Beyond this a mean is the largest percentile but for rounding."""
+EMPHASES = (1, 2, 4, 8, 16, 32, 64)
+"""Powers of two: such powers and roots are products and square roots, whose last bit is the same on every processor,
+which that of `pow` is not. With the largest one the mean is nearly the largest percentile."""
 
 
 class RuleKind(StrEnum):
@@ -61,12 +62,12 @@ class RuleConfig:
 
     kind: RuleKind = RuleKind.WEIGHTED
     weights: Mapping[str, float] = field(default_factory=lambda: GEOMETRY_WEIGHTS)
-    emphasis: float = 4.0
+    emphasis: int = 4
     order: tuple[str, ...] = MODEL_ORDER
 
     def __post_init__(self) -> None:
-        if not (1 <= self.emphasis <= MAX_EMPHASIS):
-            raise ValueError(f"emphasis must lie in [1, {MAX_EMPHASIS:g}], found {self.emphasis}")
+        if self.emphasis not in EMPHASES:
+            raise ValueError(f"emphasis must be one of {', '.join(map(str, EMPHASES))}, found {self.emphasis}")
         for name, weight in self.weights.items():
             if not (0 < weight < np.inf):
                 raise ValueError(
@@ -167,16 +168,25 @@ def _require_score(scores: ScoreTable, name: str) -> ScorerInfo:
     return infos[name]
 
 
-def _weighted_mean(percentiles: Sequence[Float64Array], weights: Sequence[float], emphasis: float) -> Float64Array:
+def _weighted_mean(percentiles: Sequence[Float64Array], weights: Sequence[float], emphasis: int) -> Float64Array:
     """Power mean over the scores a clip has; NaN where it has none."""
     total = np.zeros(len(percentiles[0]))
     weight_of_all = np.zeros(len(percentiles[0]))
     for values, weight in zip(percentiles, weights, strict=True):
         known = ~np.isnan(values)
-        total += np.where(known, values, 0.0) ** emphasis * weight
+        total += power(np.where(known, values, 0.0), emphasis) * weight
         weight_of_all += known * weight
     mean = np.divide(total, weight_of_all, out=np.full(len(total), np.nan), where=weight_of_all > 0)
-    return np.asarray(mean ** (1 / emphasis))
+    for _ in range(emphasis.bit_length() - 1):
+        mean = np.sqrt(mean)
+    return mean
+
+
+def power(values: Float64Array, exponent: int) -> Float64Array:
+    """Values to the power of an exponent of `EMPHASES`, by squaring."""
+    for _ in range(exponent.bit_length() - 1):
+        values = values * values
+    return values
 
 
 def _lexicographic(percentiles: Sequence[Float64Array]) -> Float64Array:

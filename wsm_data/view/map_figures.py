@@ -9,7 +9,7 @@ from wsm_data.view.scene_overview import SceneOverview
 from wsm_data.view.style import new_figure
 
 _WIDTH_PX = 400
-_LEFT_PX, _RIGHT_PX, _TOP_PX, _BOTTOM_PX = 56, 14, 12, 50
+_LEFT_PX, _RIGHT_PX, _TOP_PX, _BOTTOM_PX = 66, 14, 12, 50
 _TALLEST_PX = 440
 _FLATTEST_PX = 90
 

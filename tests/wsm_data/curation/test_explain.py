@@ -7,7 +7,7 @@ from wsm_data.curation.explain import ExplainedScore, explain_clips, leading_sco
 from wsm_data.curation.scores_table import Direction, ScorerInfo
 
 
-def score(name, values, percentiles, *, unit="ratio", direction=Direction.HIGHER, weight=1.0, emphasis=1.0):
+def score(name, values, percentiles, *, unit="ratio", direction=Direction.HIGHER, weight=1.0, emphasis=1):
     return ExplainedScore(
         info=ScorerInfo(name=name, unit=unit, direction=direction, summary="", absent="x"),
         weight=weight,
@@ -88,6 +88,6 @@ def test_values_carry_their_unit_and_names_do_not():
 
 def test_with_emphasis_an_extreme_score_weighs_more_than_a_heavy_one():
     heavy, extreme = {"values": [1.0], "percentiles": [0.6], "weight": 2.0}, {"values": [9.0], "percentiles": [1.0]}
-    for emphasis, leading in ((1.0, 0), (2.0, 1)):
+    for emphasis, leading in ((1, 0), (2, 1)):
         scores = [score("heavy", emphasis=emphasis, **heavy), score("extreme", emphasis=emphasis, **extreme)]
         assert leading_scores(scores).tolist() == [leading]

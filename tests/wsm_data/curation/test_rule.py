@@ -13,7 +13,7 @@ VALUES = st.lists(st.one_of(st.integers(-3, 3).map(float), st.just(np.nan)), min
 
 
 def weighted(**weights):
-    return RuleConfig(weights=weights, emphasis=1.0)
+    return RuleConfig(weights=weights, emphasis=1)
 
 
 def lexicographic(*order):
@@ -54,7 +54,7 @@ def test_a_weighted_rule_is_the_mean_of_the_percentiles_with_the_hard_end_of_eac
     np.testing.assert_allclose(rating.percentiles["ease_m"], ease)
 
 
-@given(VALUES.filter(lambda values: not np.isnan(values).any()), st.sampled_from([1.0, 2.0, 4.0, 16.0]))
+@given(VALUES.filter(lambda values: not np.isnan(values).any()), st.sampled_from([1, 2, 4, 16]))
 def test_with_emphasis_a_clip_is_rated_between_its_plain_mean_and_its_hardest_score(values, emphasis):
     columns = {"a": np.array(values), "b": -np.array(values), "c": np.zeros(len(values))}
     infos = tuple(ScorerInfo(name=one, unit="m", direction=Direction.HIGHER, summary="") for one in columns)
@@ -65,7 +65,7 @@ def test_with_emphasis_a_clip_is_rated_between_its_plain_mean_and_its_hardest_sc
         columns=columns,
     )
     weights = {"a": 1.0, "b": 2.0, "c": 0.5}
-    plain, found = (rate_clips(scores, RuleConfig(weights=weights, emphasis=one)) for one in (1.0, emphasis))
+    plain, found = (rate_clips(scores, RuleConfig(weights=weights, emphasis=one)) for one in (1, emphasis))
     ranks = np.stack([found.percentiles[name] for name in weights]).astype(float)
     expected = (np.array([1.0, 2.0, 0.5]) @ ranks**emphasis / 3.5) ** (1 / emphasis)
     np.testing.assert_allclose(found.difficulty, expected, rtol=1e-6)  # percentiles are given as float32
@@ -73,9 +73,9 @@ def test_with_emphasis_a_clip_is_rated_between_its_plain_mean_and_its_hardest_sc
     assert (found.difficulty <= ranks.max(axis=0) + 1e-6).all()
 
 
-@pytest.mark.parametrize("emphasis", [0.5, -1.0, 65.0])
+@pytest.mark.parametrize("emphasis", [0, 3, -1, 128])
 def test_an_emphasis_that_is_no_mean_is_refused(emphasis):
-    with pytest.raises(ValueError, match=r"emphasis must lie in \[1, 64\]"):
+    with pytest.raises(ValueError, match="emphasis must be one of 1, 2, 4, 8"):
         RuleConfig(emphasis=emphasis)
 
 
