@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
 import torch.utils.data
 import webdataset
 
@@ -18,10 +19,11 @@ from wsm_data.files.stores import LocalStore
 from wsm_data.loaders.config import Arrangement, OrderConfig, ReadConfig, SourceConfig
 from wsm_data.loaders.member_reads import read_members
 from wsm_data.loaders.open_shards import open_shards
-from wsm_data.loaders.plan import plan_epoch, rows_per_rank
+from wsm_data.loaders.plan import EpochPlan, plan_epoch, rows_per_rank
 from wsm_data.loaders.ranks import place_among_ranks
-from wsm_data.loaders.shard_reader import ShardReader
+from wsm_data.loaders.shard_reader import ShardReader, Span
 from wsm_data.loaders.source_table import SourceTable, open_sources
+from wsm_data.loaders.stable_hash import Int64Array
 from wsm_data.loaders.verification import Verification
 from wsm_data.shards.members import MEMBER_NAMES
 
@@ -101,11 +103,16 @@ class _Samples:
         plan = plan_epoch([opened.table.layout], self.order, self.epoch)
         worker = torch.utils.data.get_worker_info()
         first, stride = (0, 1) if worker is None else (worker.id, worker.num_workers)
-        for step in range(first, plan.steps, stride):
-            for row in plan.rows(step, self.rank, self.world_size):
-                for ref in row.tolist():
-                    yield opened.sample(ref)
+        steps, ahead = range(first, plan.steps, stride), self.read.prefetch_batches
+        for number, step in enumerate(steps):
+            for coming in steps[number + ahead if number else 0 : number + ahead + 1]:
+                opened.announce(self._refs(plan, coming))
+            for ref in self._refs(plan, step).tolist():
+                yield opened.sample(ref)
         self.epoch = plan.epoch + 1
+
+    def _refs(self, plan: EpochPlan, step: int) -> Int64Array:
+        return np.concatenate(plan.rows(step, self.rank, self.world_size))
 
     def open(self) -> "_Opened":
         """The release, opened by this process."""
@@ -130,6 +137,12 @@ class _Opened:
     table: SourceTable
     reader: ShardReader
     verification: Verification
+
+    def announce(self, refs: Int64Array) -> None:
+        """Tell the reader which clips come soon, so that a slow store is asked in advance."""
+        columns = (self.table.shard_codes, self.table.column("clip_offset"), self.table.column("clip_size"))
+        places = zip(*(column[refs].tolist() for column in columns), strict=True)
+        self.reader.expect([Span(self.table.shards[code], offset, size) for code, offset, size in places])
 
     def sample(self, ref: int) -> dict[str, Any]:
         """One clip as stock webdataset spells it."""

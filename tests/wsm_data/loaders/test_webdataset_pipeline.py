@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 import torch.utils.data
 import webdataset
+from fault_proxy import Fault
 
 from wsm_data.errors import ConfigError, IntegrityError
-from wsm_data.loaders.config import Arrangement, OrderConfig, ReadConfig, Remainder, SourceConfig, Verify
+from wsm_data.loaders.config import Arrangement, OrderConfig, ReadConfig, Remainder, RemoteAccess, SourceConfig, Verify
 from wsm_data.loaders.plan import plan_epoch
 from wsm_data.loaders.source_table import open_sources
 from wsm_data.loaders.webdataset_pipeline import as_webdataset
@@ -174,3 +175,24 @@ def test_a_closed_pipeline_leaves_nothing_open(tiny):
     pipeline = as_webdataset(str(tiny.folder), order=PAIRS)
     keys(pipeline)
     pipeline.close()
+
+
+@pytest.mark.parametrize("access", list(RemoteAccess))
+def test_a_release_behind_a_url_gives_the_same_samples_though_its_store_fails_now_and_then(remote, tmp_path, access):
+    order = OrderConfig(seed=1, global_batch=4)
+    expected = list(as_webdataset(str(remote.published.folder), split="", order=order))
+    read = remote.read(access=access, cache_dir=str(tmp_path / "cache"), verify=Verify.ALWAYS)
+    pipeline = as_webdataset(remote.url, split="", order=order, read=read)
+    remote.proxy.spoil(r"\.tar", Fault.RESET_IN_BODY, times=1)
+    remote.proxy.spoil(r"\.tar", Fault.WRONG_BYTES, times=1)
+    samples = list(pipeline)
+    pipeline.close()
+    assert remote.proxy.spoiled() == 2
+    assert len(samples) == 24
+    for sample, local in zip(samples, expected, strict=True):
+        places = {"__url__", "__local_path__"}
+        assert {name: sample[name] for name in sample if name not in places} == {
+            name: local[name] for name in local if name not in places
+        }
+        assert sample["__url__"].startswith(remote.url)
+        assert "__local_path__" not in sample
