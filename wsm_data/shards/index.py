@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -170,4 +170,4 @@ def parse_index(data: bytes, where: str) -> IndexTable:
     Raises:
         IntegrityError: it is not an index of this version, or a page is damaged.
     """
-    return IndexTable(IndexFile(pa.BufferReader(data), where).columns(SCHEMA.names))
+    return IndexTable(IndexFile(partial(pa.BufferReader, data), where).columns(SCHEMA.names))

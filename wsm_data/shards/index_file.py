@@ -1,10 +1,11 @@
 """index.parquet on a disk or in memory, of which only the columns and rows are read that somebody asks for."""
 
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from functools import lru_cache, partial
+from functools import partial
 from itertools import accumulate
+from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
@@ -14,25 +15,25 @@ from wsm_data.errors import IntegrityError
 from wsm_data.shards.index_row import INDEX_VERSION, SCHEMA
 from wsm_data.shards.row_blocks import RowBlocks
 
-_KEPT_CHOICES = 4  # a program asks for few choices of columns
+OpenFile = Callable[[], pa.NativeFile]
 
 
 class IndexFile:
-    """The columns of an index file; safe to be read by several threads.
+    """The columns of an index file; safe to be read by several threads. No file is open between two reads.
 
     Every page that is read is compared with its checksum.
 
     Args:
-        file: the content, at random access; it stays open as long as this object lives.
+        open_file: gives the content at random access; called for every read.
         where: its place, for messages.
 
     Raises:
         IntegrityError: it is not an index of this version.
     """
 
-    def __init__(self, file: pa.NativeFile, where: str):
-        self._file, self._where = file, where
-        with self._readable():
+    def __init__(self, open_file: OpenFile, where: str):
+        self._open_file, self._where = open_file, where
+        with self._opened() as file:
             self._metadata = pq.read_metadata(file)
             schema = self._metadata.schema.to_arrow_schema()
             if (schema.metadata or {}).get(b"wsm.index_version") != INDEX_VERSION.encode():
@@ -41,7 +42,7 @@ class IndexFile:
                 raise ValueError(f"its columns must be those of docs/format.md, found {schema.names}")
         sizes = [self._metadata.row_group(number).num_rows for number in range(self._metadata.num_row_groups)]
         self._starts = [0, *accumulate(sizes)]
-        self._blocks = lru_cache(_KEPT_CHOICES)(self._make_blocks)
+        self._blocks: dict[tuple[str, ...], RowBlocks] = {}  # a program asks for few choices of columns
 
     def __len__(self) -> int:
         return int(self._metadata.num_rows)
@@ -52,8 +53,8 @@ class IndexFile:
         Raises:
             IntegrityError: a page is damaged.
         """
-        with self._readable():
-            return self._open().read(list(names)).select(list(names))
+        with self._opened() as file:
+            return self._parquet(file).read(list(names)).select(list(names))
 
     def values(self, names: Sequence[str], rows: np.ndarray) -> list[np.ndarray]:
         """Some columns at some rows, in the order of `rows`; texts as arrays of objects. Rows around them are kept.
@@ -61,24 +62,54 @@ class IndexFile:
         Raises:
             IntegrityError: a page is damaged.
         """
-        return self._blocks(tuple(names)).values(rows)
-
-    def _make_blocks(self, names: tuple[str, ...]) -> RowBlocks:
-        return RowBlocks(partial(self._read_rows, names), len(self), len(names))
+        chosen = tuple(names)
+        blocks = self._blocks.setdefault(chosen, RowBlocks(len(self), len(chosen)))
+        return blocks.values(rows, partial(self._read_rows, chosen))
 
     def _read_rows(self, names: tuple[str, ...], start: int, end: int) -> tuple[int, pa.Table]:
         groups = range(bisect_right(self._starts, start) - 1, bisect_left(self._starts, end))
-        with self._readable():
-            return self._starts[groups[0]], self._open().read_row_groups(groups, list(names)).select(list(names))
+        with self._opened() as file:
+            return self._starts[groups[0]], self._parquet(file).read_row_groups(groups, list(names)).select(list(names))
 
-    def _open(self) -> pq.ParquetFile:
-        return pq.ParquetFile(self._file, metadata=self._metadata, page_checksum_verification=True)
+    def _parquet(self, file: pa.NativeFile) -> pq.ParquetFile:
+        return pq.ParquetFile(file, metadata=self._metadata, page_checksum_verification=True)
 
     @contextmanager
-    def _readable(self) -> Iterator[None]:
+    def _opened(self) -> Iterator[pa.NativeFile]:
         try:
-            yield
+            with self._open_file() as file:
+                yield file
         except (pa.ArrowException, OSError, ValueError) as error:
             raise IntegrityError(
                 f"{self._where} must be the index of a release, but: {error}; restore the file"
             ) from error
+
+
+@contextmanager
+def local_file(path: str) -> Iterator[tuple[pa.NativeFile, OpenFile]]:
+    """Open a file, and get the function that opens the same file again.
+
+    That function raises an IntegrityError where the file was replaced or written to in the meantime, so that what was
+    hashed once needs not be hashed again.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+    """
+    with pa.OSFile(path) as file:
+        yield file, partial(_open_again, path, _identity(path))
+
+
+def _open_again(path: str, identity: tuple[int, ...]) -> pa.NativeFile:
+    try:
+        file = pa.OSFile(path)
+        found = _identity(path)  # asked for after it was opened: the file that is open cannot be a later one
+    except FileNotFoundError as error:
+        raise IntegrityError(f"{path} is missing since the release was opened; fetch it again") from error
+    if found != identity:
+        raise IntegrityError(f"{path} was changed since the release was opened; open the release again")
+    return file
+
+
+def _identity(path: str) -> tuple[int, ...]:
+    found = Path(path).stat()
+    return found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns

@@ -4,7 +4,7 @@ import hashlib
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 
 import pyarrow as pa
@@ -16,7 +16,7 @@ from wsm_data.schema.clip import Clip
 from wsm_data.schema.codec import CodecInfo
 from wsm_data.shards.clip_bytes import check_members, decode_clip
 from wsm_data.shards.index import IndexTable
-from wsm_data.shards.index_file import IndexFile
+from wsm_data.shards.index_file import IndexFile, OpenFile, local_file
 from wsm_data.shards.index_row import IndexRow
 from wsm_data.shards.inventory import InventoryRow, parse_inventory, parse_quarantine
 from wsm_data.shards.manifest import ReleaseManifest, parse_manifest
@@ -143,9 +143,9 @@ def open_release(location: str | Path) -> Release:
     with ThreadPoolExecutor(1) as pool:  # the index of ten million clips takes seconds to hash, its manifest one more
         loading = pool.submit(_load_index, store)
         manifest = _parse_manifest(store, data)
-        content, found = loading.result()
+        open_file, found = loading.result()
     _require_digest(store, INDEX_NAME, manifest.index_sha256, found)
-    index = IndexTable(IndexFile(content, f"{store.root}/{INDEX_NAME}"))
+    index = IndexTable(IndexFile(open_file, f"{store.root}/{INDEX_NAME}"))
     if len(index) != manifest.clips:
         raise IntegrityError(
             f"{store.root}: the manifest counts {manifest.clips} clips, the index has {len(index)} rows"
@@ -183,19 +183,16 @@ def _parse_manifest(store: Store, data: bytes) -> ReleaseManifest:
         raise IntegrityError(f"{error}. Fetch the release again, or write it again with `wsm pack`") from error
 
 
-def _load_index(store: Store) -> tuple[pa.NativeFile, str]:
-    """The index at random access, and its sha256. A local one stays on its disk, one behind a URL is fetched once.
-
-    What was hashed and what is read later is one open file, whatever happens to its name.
-    """
+def _load_index(store: Store) -> tuple[OpenFile, str]:
+    """How to open the index, and its sha256. A local one stays on its disk, one behind a URL is fetched once."""
     if not isinstance(store, LocalStore):
         data = _read_whole(store, INDEX_NAME)
-        return pa.BufferReader(data), sha256_bytes(data)
+        return partial(pa.BufferReader, data), sha256_bytes(data)
     try:
-        file = pa.OSFile(f"{store.root}/{INDEX_NAME}")
+        with local_file(f"{store.root}/{INDEX_NAME}") as (file, open_again):
+            return open_again, hashlib.file_digest(file, "sha256").hexdigest()
     except FileNotFoundError as error:
         raise _missing(store, INDEX_NAME) from error
-    return file, hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _refuse_outer_folder(store: Store) -> None:

@@ -22,37 +22,41 @@ class RowBlocks:
     """Some columns of an index, read in groups of rows and kept in blocks; safe to be used by several threads.
 
     Args:
-        read: reads at least the rows from its first argument up to its second; gives the first row and the table.
         rows: rows of the index.
         columns: how many columns the tables have.
     """
 
-    def __init__(self, read: ReadRows, rows: int, columns: int):
-        self._read, self._rows = read, rows
+    def __init__(self, rows: int, columns: int):
+        self._rows = rows
         self._kept_blocks = max(_KEPT_VALUES // (_BLOCK_ROWS * columns), 1)
         self._blocks: OrderedDict[int, Block] = OrderedDict()
         self._lock = threading.Lock()
 
-    def values(self, rows: np.ndarray) -> list[np.ndarray]:
-        """Each column at some rows, in the order of `rows`; texts as arrays of objects."""
+    def values(self, rows: np.ndarray, read: ReadRows) -> list[np.ndarray]:
+        """Each column at some rows, in the order of `rows`; texts as arrays of objects.
+
+        Args:
+            rows: numbers of rows, at least one.
+            read: reads at least the rows from its first argument up to its second; gives the first row and the table.
+        """
         numbers, place = np.unique(rows // _BLOCK_ROWS, return_inverse=True)
         with self._lock:
-            blocks = [self._block(number) for number in numbers.tolist()]
+            blocks = [self._block(number, read) for number in numbers.tolist()]
         at = place * _BLOCK_ROWS + rows % _BLOCK_ROWS  # only the last block of an index may be shorter
         return [np.concatenate(parts)[at] for parts in zip(*blocks, strict=True)]
 
-    def _block(self, number: int) -> Block:
+    def _block(self, number: int, read: ReadRows) -> Block:
         if number not in self._blocks:
-            self._read_block(number)
+            self._read_block(number, read)
         self._blocks.move_to_end(number)
         found = self._blocks[number]
         while len(self._blocks) > self._kept_blocks:
             self._blocks.popitem(last=False)
         return found
 
-    def _read_block(self, number: int) -> None:
+    def _read_block(self, number: int, read: ReadRows) -> None:
         start, end = self._bounds(number)
-        first, table = self._read(start, end)
+        first, table = read(start, end)
         numbers: Sequence[int] = [number]
         if self._rows <= self._kept_blocks * _BLOCK_ROWS:  # all that was read may stay
             whole = range(-(-first // _BLOCK_ROWS), -(-(first + len(table)) // _BLOCK_ROWS))

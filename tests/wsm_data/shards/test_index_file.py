@@ -1,3 +1,4 @@
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -8,7 +9,7 @@ import pytest
 
 from wsm_data.errors import IntegrityError
 from wsm_data.shards.index import IndexTable, write_index
-from wsm_data.shards.index_file import IndexFile
+from wsm_data.shards.index_file import IndexFile, local_file
 from wsm_data.shards.index_row import SCHEMA
 from wsm_data.shards.names import INDEX_NAME
 
@@ -24,7 +25,7 @@ def path(tiny: SimpleNamespace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
 
 
 def open_it(path: Path) -> IndexFile:
-    return IndexFile(pa.OSFile(str(path)), str(path))
+    return IndexFile(partial(pa.OSFile, str(path)), str(path))
 
 
 def damage(path: Path, column: str, group: int) -> None:
@@ -67,7 +68,7 @@ def test_columns_and_groups_are_read_alone(path: Path) -> None:
 
 
 def test_bytes_in_memory_are_read_like_a_file(path: Path) -> None:
-    index = IndexTable(IndexFile(pa.BufferReader(path.read_bytes()), "there"))
+    index = IndexTable(IndexFile(partial(pa.BufferReader, path.read_bytes()), "there"))
     assert index.row_at(5) == IndexTable(open_it(path)).row_at(5)
 
 
@@ -78,3 +79,26 @@ def test_an_index_of_no_rows_has_none(tmp_path: Path) -> None:
     assert index.codes("shard")[1] == ()
     with pytest.raises(IndexError):
         index.row_at(0)
+
+
+def test_no_file_is_open_between_two_reads(path: Path) -> None:
+    before = len(list(Path("/proc/self/fd").iterdir()))
+    index = IndexTable(open_it(path))
+    index.row_at(3)
+    index.numbers("latents")
+    assert len(list(Path("/proc/self/fd").iterdir())) == before
+
+
+def test_a_file_is_opened_again_only_as_it_was(path: Path, tmp_path: Path) -> None:
+    with local_file(str(path)) as (file, open_again):
+        assert file.read() == path.read_bytes()
+    with open_again() as again:
+        assert again.read() == path.read_bytes()
+    kept = path.rename(tmp_path / "kept")
+    with pytest.raises(IntegrityError, match="is missing since the release was opened; fetch it again"):
+        open_again()
+    path.write_bytes(kept.read_bytes())
+    with pytest.raises(IntegrityError, match="was changed since the release was opened; open the release again"):
+        open_again()
+    with pytest.raises(FileNotFoundError), local_file(str(tmp_path / "nowhere")):
+        pass

@@ -32,7 +32,7 @@ class Table:
         return first, self.whole.slice(first, last - first)
 
     def blocks(self, kept: int) -> RowBlocks:
-        blocks = RowBlocks(self.read, len(self.whole), 2)
+        blocks = RowBlocks(len(self.whole), 2)
         blocks._kept_blocks = kept
         return blocks
 
@@ -45,7 +45,7 @@ def test_values_are_those_of_the_rows_in_their_order(
     blocks = table.blocks(kept)
     for _ in range(3):
         wanted = data.draw(st.lists(st.integers(0, rows - 1), min_size=1, max_size=20))
-        numbers, texts = blocks.values(np.array(wanted))
+        numbers, texts = blocks.values(np.array(wanted), table.read)
         assert numbers.tolist() == wanted
         assert texts.tolist() == [f"row {row}" for row in wanted]
         assert len(blocks._blocks) <= kept
@@ -55,12 +55,12 @@ def test_what_was_read_is_not_read_again() -> None:
     table = Table(40, 8)
     blocks = table.blocks(kept=3)
     for _ in range(3):
-        blocks.values(np.array([0, 9, 17, 10, 1]))
+        blocks.values(np.array([0, 9, 17, 10, 1]), table.read)
     assert table.reads == [(0, 4), (8, 12), (16, 20)]
-    blocks.values(np.array([39]))  # the block of rows 0 to 3 has waited longest, and goes
-    blocks.values(np.array([9, 17]))
+    blocks.values(np.array([39]), table.read)  # the block of rows 0 to 3 has waited longest, and goes
+    blocks.values(np.array([9, 17]), table.read)
     assert table.reads[3:] == [(36, 40)]
-    blocks.values(np.array([0]))
+    blocks.values(np.array([0]), table.read)
     assert table.reads[4:] == [(0, 4)]
 
 
@@ -68,13 +68,13 @@ def test_of_an_index_that_fits_everything_that_was_read_is_kept() -> None:
     table = Table(22, 8)
     blocks = table.blocks(kept=6)
     for row in range(22):
-        blocks.values(np.array([row]))
+        blocks.values(np.array([row]), table.read)
     assert table.reads == [(0, 4), (8, 12), (16, 20)]
 
 
 def test_values_keep_nothing_else_in_memory() -> None:
     table = Table(40, 40)
-    numbers, _ = table.blocks(kept=1)._block(2)
+    numbers, _ = table.blocks(kept=1)._block(2, table.read)
     assert numbers.base is None
     assert len(numbers) == BLOCK
 
@@ -84,7 +84,7 @@ def test_threads_get_what_they_ask_for() -> None:
     blocks = table.blocks(kept=5)
     wanted = [np.random.default_rng(seed).integers(0, 400, 30) for seed in range(40)]
     with ThreadPoolExecutor(4) as pool:
-        found = list(pool.map(blocks.values, wanted))
+        found = list(pool.map(lambda rows: blocks.values(rows, table.read), wanted))
     for rows, (numbers, texts) in zip(wanted, found, strict=True):
         np.testing.assert_array_equal(numbers, rows)
         assert texts.tolist() == [f"row {row}" for row in rows]
