@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from wsm_data.errors import IntegrityError
 from wsm_data.loaders.clip_reads import MAX_READS
-from wsm_data.loaders.shard_reader import ShardReader
+from wsm_data.loaders.shard_reader import ShardReader, Span
 from wsm_data.shards.clip_bytes import check_members
 from wsm_data.shards.index_row import IndexRow
 from wsm_data.shards.members import Member, header_bytes
@@ -29,12 +29,12 @@ def read_members(
         IntegrityError: the shard is missing or ends too early, or its bytes are not those that the index vouches for;
             names shard and clip.
     """
-    stored = [member for member in row.members if member.name in names]
-    first = stored[0].header_offset
-    members = tuple(_moved(member, first) for member in stored)
-    data = memoryview(bytearray(members[-1].end_offset))
+    span = span_of_members(row, names)
+    first = span.offset - row.clip_offset
+    members = tuple(_moved(member, first) for member in row.members if member.name in names)
+    data = memoryview(bytearray(span.size))
     for reads in range(1, MAX_READS + 1):
-        reader.read_into(row.shard, row.clip_offset + first, [data])
+        reader.read_into(row.shard, span.offset, [data])
         try:
             if checked:
                 _check(data, members, row)
@@ -43,6 +43,13 @@ def read_members(
             if reads == MAX_READS or not reader.forget(row.shard):
                 raise
     return data, members
+
+
+def span_of_members(row: IndexRow, names: Sequence[str]) -> Span:
+    """The stretch that `read_members` reads, so that it can be announced."""
+    members = [member for member in row.members if member.name in names]
+    first, end = members[0].header_offset, members[-1].end_offset
+    return Span(row.shard, row.clip_offset + first, end - first)
 
 
 def _moved(member: Member, offset: int) -> Member:

@@ -16,7 +16,7 @@ from wsm_data.geometry.transform import transforms_from_vectors
 from wsm_data.loaders.batch import POSE_SLOTS, Batch
 from wsm_data.loaders.config import LoaderConfig, ReadConfig
 from wsm_data.loaders.loader import ClipLoader
-from wsm_data.loaders.member_reads import read_members
+from wsm_data.loaders.member_reads import read_members, span_of_members
 from wsm_data.loaders.plan import PlanReport
 from wsm_data.loaders.query_batch import QueryBatch
 from wsm_data.loaders.query_table import QueryConfig, QuerySources, open_queries
@@ -151,7 +151,7 @@ class _MapReader:
         Raises:
             IntegrityError: the bytes of a clip are not those that the release vouches for; names shard and clip.
         """
-        maps = [self._clip_map(ref) for ref in history.refs.tolist()]
+        maps = self._clip_maps(history.refs.tolist())
         replan = history.lengths.cpu().numpy() - 1
         T_world_camera0 = np.array([one.meta.T_world_camera0_matrix for one in maps]).reshape(-1, 4, 4)
         resolution_m = np.array([one.meta.map_resolution_m for one in maps])
@@ -185,12 +185,21 @@ class _MapReader:
             future[number] = one.expert_distance[TEMPORAL_RATIO * latent :][:frames]
         return future
 
-    def _clip_map(self, ref: int) -> _ClipMap:
-        table, number = self._sources.locate(ref)
-        source = self._sources.tables.index(table)
-        row = table.index_row(number)
+    def _clip_maps(self, refs: Sequence[int]) -> list[_ClipMap]:
+        places = [self._sources.locate(ref) for ref in refs]
+        owners = [self._sources.tables.index(table) for table, _ in places]
+        rows = [table.index_row(number) for table, number in places]
+        readers = self._open_readers()
+        for owner, row in zip(owners, rows, strict=True):  # a slow store is asked for all of them at once
+            readers[owner].expect([span_of_members(row, _MAP_MEMBERS)])
+        return [
+            self._clip_map(readers[owner], row, owner, number)
+            for owner, row, (_, number) in zip(owners, rows, places, strict=True)
+        ]
+
+    def _clip_map(self, reader: ShardReader, row: IndexRow, source: int, number: int) -> _ClipMap:
         due = self._verification.is_due(source, number)
-        data, members = read_members(self._open_readers()[source], row, _MAP_MEMBERS, checked=due)
+        data, members = read_members(reader, row, _MAP_MEMBERS, checked=due)
         self._verification.passed(source, number)
         arrays = {
             member.name: np.frombuffer(content_of(data, member), STORED_DTYPES[member.name]).reshape(member.shape)

@@ -3,12 +3,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
 import torch.utils.data
 
 from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.geometry.transform import transforms_from_vectors
 from wsm_data.loaders.audit_run import audit_epochs
-from wsm_data.loaders.config import Arrangement, LoaderConfig, OrderConfig, ReadConfig, Remainder, SourceConfig, Verify
+from wsm_data.loaders.config import (
+    Arrangement,
+    LoaderConfig,
+    OrderConfig,
+    ReadConfig,
+    Remainder,
+    RemoteAccess,
+    SourceConfig,
+    Verify,
+)
 from wsm_data.loaders.ledger_sources import open_recorded_sources
 from wsm_data.loaders.ledger_timeline import read_timeline
 from wsm_data.loaders.queries import QueryLoader
@@ -203,3 +213,15 @@ def test_a_rank_may_have_no_query_in_a_step(driven):
         with QueryLoader(config_of(release, global_batch=8), TWO, rank=rank, world_size=8) as loader:
             sizes += [(len(batch.replan_latent), len(batch.occupancy), len(batch.T_world_camera)) for batch in loader]
     assert sorted(sizes) == [(0, 0, 0)] * 4 + [(1, 1, 1)] * 12
+
+
+@pytest.mark.parametrize("access", list(RemoteAccess))
+def test_a_release_behind_a_url_gives_the_same_queries(remote, tmp_path, access):
+    short = QueryConfig(future_latents=1)
+    local = replace(config_of(str(remote.published.folder)), read=ReadConfig(standardise=False))
+    url = replace(config_of(remote.url), read=remote.read(access=access, cache_dir=str(tmp_path), standardise=False))
+    with QueryLoader(local, short) as near, QueryLoader(url, short) as far:
+        for one, other in zip(near, far, strict=True):
+            assert seen([one]) == seen([other])
+            for name in ("occupancy", "geodesic_mm", "T_world_camera", "expert_distance_m"):
+                assert torch.equal(getattr(one, name), getattr(other, name))
