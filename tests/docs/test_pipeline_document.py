@@ -32,7 +32,9 @@ def test_every_stage_is_in_the_tour():
 def test_every_option_in_the_documentation_exists(page):
     text = (ROOT / page).read_text()
     options = set(re.findall(r"(?<![\w-])--[a-z][a-z-]+", text))
-    helped = "".join(CliRunner().invoke(app, [name, "--help"]).output for name in ("run", "inspect", "verify", "select", "audit"))
+    helped = "".join(
+        CliRunner().invoke(app, [name, "--help"]).output for name in ("run", "inspect", "verify", "select", "audit")
+    )
     assert options - {one for one in options if one in helped} == set()
 
 

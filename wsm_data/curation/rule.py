@@ -5,6 +5,7 @@ are easier, clips of equal value counted half (mid-ranks). Any monotone change o
 """
 
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from enum import StrEnum
 from types import MappingProxyType
@@ -37,6 +38,9 @@ MODEL_ORDER = ("rollout_unsafe_share", "rollout_mean_cost_m2")
 EMPHASES = (1, 2, 4, 8, 16, 32, 64)
 """Powers of two: such powers and roots are products and square roots, whose last bit is the same on every processor,
 which that of `pow` is not. With the largest one the mean is nearly the largest percentile."""
+
+
+_SORTS_AT_ONCE = 2  # each takes some 500 MB for ten million clips
 
 
 class RuleKind(StrEnum):
@@ -117,8 +121,9 @@ def rate_clips(scores: ScoreTable, config: RuleConfig, rows: NDArray[np.int64] |
         ConfigError: the rule names a score that is not there or has no hard end, or a clip has none of its scores.
     """
     infos = [_require_score(scores, name) for name in config.scores]
-    percentiles = {one.name: hardness_percentiles(_column(scores, one.name, rows), one.direction) for one in infos}
-    ranked = list(percentiles.values())
+    with ThreadPoolExecutor(_SORTS_AT_ONCE) as pool:  # sorting holds no lock, and takes most of the time
+        ranked = list(pool.map(lambda one: hardness_percentiles(_column(scores, one.name, rows), one.direction), infos))
+    percentiles = dict(zip(config.scores, ranked, strict=True))
     if config.kind is RuleKind.WEIGHTED:
         difficulty = _weighted_mean(ranked, list(config.weights.values()), config.emphasis)
     else:

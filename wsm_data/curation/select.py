@@ -104,7 +104,7 @@ def select_clips(
     candidates = rows[~excluded.clips]
     _require_enough(len(candidates), count, excluded, config)
     rating = rate_clips(scores, config.rule, candidates)
-    walk = np.lexsort((key_hashes(scores.keys)[candidates], -rating.difficulty))
+    walk = hardest_first(rating.difficulty, key_hashes(scores.keys)[candidates])
     ordered = index.select(list(QUOTA_COLUMNS.values())).take(pa.array(candidates[walk]))
     chosen = choose_clips(
         quota_table(config.quotas, ordered, count),
@@ -124,6 +124,20 @@ def select_clips(
         near_duplicates=chosen.near_duplicates,
         over_quota=chosen.over_quota,
     )
+
+
+def hardest_first(difficulty: Float64Array, hashes: NDArray[np.uint64]) -> NDArray[np.int64]:
+    """Order of clips from the hardest down, equal ones by their hash; int64 [M].
+
+    As `np.lexsort((hashes, -difficulty))`, and faster: few clips are equal, and only they are sorted twice.
+    """
+    order = np.argsort(-difficulty)
+    equal = difficulty[order[1:]] == difficulty[order[:-1]]
+    tied = np.flatnonzero(np.append(equal, False) | np.insert(equal, 0, False))
+    group = np.cumsum(~np.insert(equal, 0, False))[tied]
+    clips = order[tied]
+    order[tied] = clips[np.lexsort((clips, hashes[clips], group))]
+    return order
 
 
 def explained_scores(

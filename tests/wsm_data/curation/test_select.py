@@ -1,13 +1,15 @@
 import numpy as np
 import pyarrow as pa
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from wsm_data.curation.diversity import DiversityConfig
 from wsm_data.curation.exclusion import ExclusionConfig
 from wsm_data.curation.key_order import key_hashes
 from wsm_data.curation.quotas import Quota, QuotaConfig
-from wsm_data.curation.rule import RuleConfig, RuleKind
-from wsm_data.curation.select import SelectionConfig, explained_scores, rate_clips, select_clips
+from wsm_data.curation.rule import RuleConfig, RuleKind, rate_clips
+from wsm_data.curation.select import SelectionConfig, explained_scores, hardest_first, select_clips
 from wsm_data.errors import ConfigError
 
 RULE = RuleConfig(weights={"detour": 1.0})
@@ -114,3 +116,10 @@ def test_explained_scores_are_those_of_the_clips_in_question(make_scores):
     [found] = explained_scores(scores, RULE, rating, rows, np.array([2, 0]))
     assert (found.values.tolist(), found.weight) == ([9, 3], 1.0)
     np.testing.assert_allclose(found.percentiles, [5 / 6, 1 / 6], rtol=1e-6)  # float32
+
+
+@given(st.lists(st.tuples(st.integers(0, 4), st.integers(0, 4)), max_size=30))
+def test_the_walk_is_that_of_a_sort_by_difficulty_and_hash(pairs):
+    difficulty = np.array([pair[0] for pair in pairs], np.float64)
+    hashes = np.array([pair[1] for pair in pairs], np.uint64)
+    assert hardest_first(difficulty, hashes).tolist() == np.lexsort((hashes, -difficulty)).tolist()
