@@ -9,6 +9,7 @@ from megatron.energon import (
     Cooker,
     DefaultTaskEncoder,
     WorkerConfig,
+    basic_sample_keys,
     get_savable_loader,
     get_train_dataset,
     stateless,
@@ -32,8 +33,9 @@ def write(folder: Path) -> None:
 
 @stateless
 def cook(sample: dict[str, bytes]) -> dict[str, object]:
-    """Bytes to tensors, without a copy."""
-    return {name: with_webdataset.tensor(sample[f"{name}.npy"]) for name in NAMES}
+    """Bytes to tensors, without a copy; the library's own keys are what it restores its state by."""
+    tensors = {name: with_webdataset.tensor(sample[f"{name}.npy"]) for name in NAMES}
+    return {**tensors, **basic_sample_keys(sample)}
 
 
 class Encoder(DefaultTaskEncoder):
@@ -47,7 +49,7 @@ class Encoder(DefaultTaskEncoder):
 
     @stateless
     def batch(self, samples: list[dict[str, object]]) -> dict[str, object]:
-        return default_collate(samples)
+        return default_collate([{name: sample[name] for name in NAMES} for sample in samples])
 
 
 class Opened:
