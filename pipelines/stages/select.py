@@ -73,8 +73,8 @@ def _list_units(config: SelectConfig) -> Sequence[Unit]:
 def _process(batch: Sequence[Unit], config: SelectConfig, context: StageContext) -> Iterator[Outcome]:
     for unit in batch:
         release = open_release(config.release)
-        scores = read_needed_scores(release, config)
         index = release.index.columns(INDEX_COLUMNS)
+        scores = _needed_scores(release, config, index["key"])
         chosen = select_clips(index, scores, partial(read_paths, config.scores_location), config)
         path = context.out / config.file_name
         write_selection(path, _selection(config, scores, index, chosen, unit.inputs["scores"]))
@@ -88,16 +88,12 @@ def _process(batch: Sequence[Unit], config: SelectConfig, context: StageContext)
         yield Outcome(unit=unit.id, digest=sha256_file(path), outputs=(config.file_name,), facts=facts)
 
 
-def read_needed_scores(release: Release, config: SelectConfig) -> ScoreTable:
-    """The scores that the settings name.
-
-    Raises:
-        ConfigError: there are none, they are of another release, one is not there, or a value is NaN.
-    """
+def _needed_scores(release: Release, config: SelectConfig, keys: pa.ChunkedArray) -> ScoreTable:
+    """The scores that the settings name, of the clips with these keys."""
     return read_scores(
         config.scores_location,
         release_digest=release_digest(release.manifest),
-        release_keys=release.index.columns(["key"])["key"],
+        release_keys=keys,
         only=config.score_names(read_scorers(config.scores_location)),
     )
 
