@@ -59,6 +59,7 @@ class CachedShards:
         self._changed = threading.Condition()
         self._announced: Announcements[None] = Announcements()
         self._next_try_s: dict[str, float] = {}
+        self._downloads = 0
         self._downloaded_bytes = self._read_bytes = 0
         self._has_warned = False
         self._ahead = [
@@ -81,8 +82,8 @@ class CachedShards:
             raise missing_shard(self._store.root, shard)
         span = Span(shard, offset, sum(len(buffer) for buffer in buffers))
         while not (self._read_present(cached, span, buffers) or self._read_downloaded(cached, span, buffers)):
-            if self._closed.wait(_POLL_S):
-                raise StoreError(f"{self._store.root}: the reader was closed while {shard} was being read")
+            self._require_open(cached)
+            self._closed.wait(_POLL_S)
         with self._changed:
             self._strike(span)
 
@@ -106,6 +107,8 @@ class CachedShards:
         self._store.close()
         for thread in self._ahead:
             thread.join()
+        with self._changed:
+            self._changed.wait_for(lambda: not self._downloads)
         self._parts.shutdown()
 
     def _read_present(self, shard: CachedShard, span: Span, buffers: Sequence[memoryview]) -> bool:
@@ -125,12 +128,24 @@ class CachedShards:
             self._read_from(begun.descriptor, span, buffers)
         return True
 
+    def _require_open(self, shard: CachedShard) -> None:
+        if self._closed.is_set():
+            raise StoreError(f"{self._store.root}: the reader was closed while {shard.name} was being read")
+
     def _read_from(self, descriptor: int, span: Span, buffers: Sequence[memoryview]) -> None:
         if read_scattered(descriptor, span.offset, buffers) < span.size:
             raise short_shard(self._store.root, span, os.fstat(descriptor).st_size)
 
     def _download(self, shard: CachedShard, download: Download) -> None:
-        fill(shard, download, self._store, self._parts, self._fetch_threads)
+        with self._changed:
+            self._require_open(shard)
+            self._downloads += 1
+        try:
+            fill(shard, download, self._store, self._parts, self._fetch_threads)
+        finally:
+            with self._changed:
+                self._downloads -= 1
+                self._changed.notify_all()
         with self._changed:
             self._downloaded_bytes += shard.bytes
             is_waste = self._downloaded_bytes > self._limit_bytes + _WASTEFUL * self._read_bytes

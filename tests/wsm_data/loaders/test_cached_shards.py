@@ -15,14 +15,14 @@ FOREVER = 10**9
 
 
 @pytest.fixture
-def open_reader(remote, published, tmp_path):
+def open_reader(remote, address, published, tmp_path):
     """Opens readers that share a cache of two and a half shards, and closes them at the end."""
     readers = []
     limit = max(shard.bytes for shard in published.manifest.shards) * 2.5
 
     def open_one(**changes):
         settings = {"cache_dir": str(tmp_path / "cache"), "cache_gib": limit / GIB} | changes
-        readers.append(CachedShards(remote.url, published.manifest, remote.read(**settings)))
+        readers.append(CachedShards(address, published.manifest, remote.read(**settings)))
         return readers[-1]
 
     open_one.limit = limit
@@ -137,14 +137,14 @@ def test_faults_that_pass_change_nothing(open_reader, published, remote, faults)
     assert remote.proxy.spoiled() == len(faults)
 
 
-def test_a_store_that_fails_for_good_is_an_error_that_names_the_shard(open_reader, published, remote):
+def test_a_store_that_fails_for_good_is_an_error_that_names_the_shard(open_reader, published, remote, address):
     reader = open_reader(attempts=2)
     bad = shards_of(published)[1]
     remote.proxy.spoil(bad, Fault.RESET_IN_BODY, FOREVER)
     reader.expect(first_spans(published))
     for span in first_spans(published):
         if span.shard == bad:
-            with pytest.raises(StoreError, match=f"{remote.url}/{bad}: no answer in 2 attempts"):
+            with pytest.raises(StoreError, match=f"{address}/{bad}: no answer in 2 attempts"):
                 read_clip(reader, span)
         else:
             assert read_clip(reader, span) == published.bytes_of(span)
@@ -158,7 +158,7 @@ def test_a_shard_that_stays_damaged_is_never_read(open_reader, published, remote
 
 
 def test_a_shard_that_the_release_does_not_have_is_named(open_reader):
-    with pytest.raises(IntegrityError, match=r"train-999999\.tar is missing from s3://"):
+    with pytest.raises(IntegrityError, match=r"train-999999\.tar is missing from \w+://"):
         read_clip(open_reader(), Span("train-999999.tar", 0, 200))
 
 

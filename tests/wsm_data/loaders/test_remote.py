@@ -16,12 +16,12 @@ FOREVER = 10**9
 
 
 @pytest.fixture
-def open_reader(remote):
+def open_reader(remote, address):
     """Opens readers of the release behind the proxy, and closes them at the end."""
     readers = []
 
     def open_one(**changes):
-        readers.append(RangeReader(remote.url, remote.read(**changes)))
+        readers.append(RangeReader(address, remote.read(**changes)))
         return readers[-1]
 
     yield open_one
@@ -111,16 +111,14 @@ def test_a_hanging_server_is_given_up_and_asked_again(open_reader, published, re
     ],
 )
 def test_a_fault_that_lasts_is_an_error_that_names_object_attempts_and_cause(
-    open_reader, published, remote, fault, is_announced
+    open_reader, published, remote, address, fault, is_announced
 ):
     reader = open_reader(attempts=3, request_timeout_s=0.5 if fault is Fault.HANG else 10.0)
     span = published.spans[7]
     remote.proxy.spoil(span.shard, fault, FOREVER)
     if is_announced:
         reader.expect([span])
-    with pytest.raises(
-        StoreError, match=rf"{remote.url}/{span.shard}: no answer in 3 attempts, at last because of \w+"
-    ):
+    with pytest.raises(StoreError, match=rf"{address}/{span.shard}: no answer in 3 attempts, at last because of \w+"):
         read_clip(reader, span)
     if fault is Fault.HANG:  # connecting counts against the time limit too
         assert remote.proxy.spoiled() <= 3
@@ -131,22 +129,11 @@ def test_a_fault_that_lasts_is_an_error_that_names_object_attempts_and_cause(
 def test_a_refusal_is_not_asked_again(open_reader, published, remote):
     reader = open_reader()
     remote.proxy.spoil(published.spans[0].shard, Fault.FORBIDDEN, FOREVER)
-    with pytest.raises(StoreError, match=f"{published.spans[0].shard}: the store refuses .*PermissionError"):
+    with pytest.raises(
+        StoreError, match=f"{published.spans[0].shard}: the store refuses .*(PermissionError|Forbidden)"
+    ):
         read_clip(reader, published.spans[0])
     assert remote.proxy.spoiled() == 1
-
-
-def test_without_credentials_the_message_says_so(open_reader, published, monkeypatch):
-    for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"):
-        monkeypatch.delenv(name)
-    with pytest.raises(StoreError, match=r"the store refuses .*[Cc]redentials"):
-        read_clip(open_reader(), published.spans[0])
-
-
-def test_a_server_that_is_not_there_is_asked_again_and_named(open_reader, published, monkeypatch):
-    monkeypatch.setenv("AWS_ENDPOINT_URL", "http://127.0.0.1:9")  # nobody listens on the port of "discard"
-    with pytest.raises(StoreError, match=r"no answer in 2 attempts.*Could not connect"):
-        read_clip(open_reader(attempts=2), published.spans[0])
 
 
 @pytest.mark.parametrize("is_announced", [True, False])
@@ -154,7 +141,7 @@ def test_a_shard_that_is_missing_is_named(open_reader, is_announced):
     reader, span = open_reader(), Span("train-999999.tar", 0, 100)
     if is_announced:
         reader.expect([span])
-    with pytest.raises(IntegrityError, match=r"train-999999\.tar is missing from s3://"):
+    with pytest.raises(IntegrityError, match=r"train-999999\.tar is missing from \w+://"):
         read_clip(reader, span)
 
 
@@ -249,6 +236,23 @@ def test_reading_again_asks_the_store_again(open_reader, published, remote):
     assert read_clip(reader, span) != published.bytes_of(span)
     assert reader.forget(span.shard)
     assert read_clip(reader, span) == published.bytes_of(span)
+
+
+def test_without_credentials_the_message_says_so(remote, published, monkeypatch):
+    for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"):
+        monkeypatch.delenv(name)
+    reader = RangeReader(remote.url, remote.read())
+    with pytest.raises(StoreError, match=r"the store refuses .*[Cc]redentials"):
+        read_clip(reader, published.spans[0])
+    reader.close()
+
+
+def test_a_server_that_is_not_there_is_asked_again_and_named(remote, published, monkeypatch):
+    monkeypatch.setenv("AWS_ENDPOINT_URL", "http://127.0.0.1:9")  # nobody listens on the port of "discard"
+    reader = RangeReader(remote.url, remote.read(attempts=2))
+    with pytest.raises(StoreError, match=r"no answer in 2 attempts.*Could not connect"):
+        read_clip(reader, published.spans[0])
+    reader.close()
 
 
 def spans_of_shard(published, shard):

@@ -23,6 +23,8 @@ NO_LISTING = (
     b"<?xml version='1.0'?><ListBucketResult xmlns='http://s3.amazonaws.com/doc/2006-03-01/'><IsTruncated>false"
     b"</IsTruncated><KeyCount>0</KeyCount></ListBucketResult>"
 )
+ANYBODY = "AWS4-HMAC-SHA256 Credential=test/20260101/us-east-1/s3/aws4_request, SignedHeaders=host, Signature=0"
+"""Tells moto that S3 is meant, where a plain HTTP client asks."""
 _UPSTREAM_TIMEOUT_S = 30.0
 
 
@@ -114,6 +116,7 @@ class FaultProxy:
     def forward(
         self, method: str, path: str, headers: dict[str, str], body: bytes
     ) -> tuple[int, dict[str, str], bytes]:
+        headers = {"Authorization": ANYBODY} | headers
         connection = http.client.HTTPConnection(*self._upstream, timeout=_UPSTREAM_TIMEOUT_S)
         try:
             connection.request(method, path, body or None, headers)

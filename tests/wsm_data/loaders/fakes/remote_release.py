@@ -113,3 +113,9 @@ def remote(
         monkeypatch.setenv("AWS_SHARED_CREDENTIALS_FILE", str(tmp_path / "absent"))
         monkeypatch.setenv("AWS_EC2_METADATA_DISABLED", "true")
         yield Remote(published, proxy)
+
+
+@pytest.fixture(params=["http", pytest.param("s3", marks=pytest.mark.slow)])
+def address(request: pytest.FixtureRequest, remote: Remote) -> str:
+    """URL of the published release; a client of S3 takes a tenth of a second of computing to make."""
+    return remote.url if request.param == "s3" else f"{remote.proxy.url}/{BUCKET}/tiny"
