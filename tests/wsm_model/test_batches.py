@@ -1,0 +1,81 @@
+"""From a loader's batch to noised parts."""
+
+from types import SimpleNamespace
+
+import pytest
+import torch
+
+from wsm_model.batches import chunk_flow_times, noise_stream, spans_of, training_inputs
+from wsm_model.mot.chunks import SequenceSpan
+
+SHIFT = 5.0
+
+
+@pytest.fixture
+def batch(make_poses):
+    """Three rows: one sequence, two that share a row, one short."""
+    torch.manual_seed(0)
+    return SimpleNamespace(
+        rgb=torch.randn(3, 6, 6, 4, 6),
+        depth=torch.randn(3, 6, 6, 4, 6),
+        poses=make_poses(3, 6, 4),
+        row=torch.tensor([0, 1, 1, 2]),
+        start=torch.tensor([0, 0, 4, 0]),
+        lengths=torch.tensor([6, 4, 2, 3]),
+        chunk_size=torch.tensor([2, 1, 4, 3]),
+        goal_camera0_m=torch.randn(4, 3),
+        refs=torch.tensor([5, 9, 2, 7]),
+        keys=("a", "b", "c", "d"),
+        epoch=1,
+        step=4,
+    )
+
+
+def parts_of(batch, **changes):
+    return list(training_inputs(batch, **({"seed": 3, "flow_shift": SHIFT} | changes)))
+
+
+def test_parts_hold_every_sequence_once_with_the_noise_it_has_in_the_whole(batch):
+    (whole,) = parts_of(batch)
+    parts = parts_of(batch, micro_rows=1)
+    assert [part.keys for part in parts] == [("a",), ("b", "c"), ("d",)]
+    assert parts[2].inputs.rgb.shape[1] == 3  # cut to its longest row
+    for row, part in enumerate(parts):
+        length = part.noise.shape[1]
+        assert torch.equal(part.noise[0], whole.noise[row, :length])
+        assert torch.equal(part.inputs.flow_time[0], whole.inputs.flow_time[row, :length])
+        assert torch.equal(part.inputs.noisy_rgb[0], whole.inputs.noisy_rgb[row, :length])
+
+
+def test_a_sequence_has_its_noise_whichever_row_it_falls_to(batch):
+    (first,) = parts_of(batch)
+    batch.row, batch.rgb = torch.tensor([2, 1, 1, 0]), batch.rgb.flip(0)
+    (moved,) = parts_of(batch)
+    assert torch.equal(first.noise[0], moved.noise[2])
+    assert torch.equal(first.noise[2, :3], moved.noise[0, :3])
+
+
+def test_noise_is_another_in_each_step_epoch_seed_and_clip():
+    streams = [(0, 0, 0, 0), (1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1)]
+    drawn = [float(torch.rand(1, generator=noise_stream(*one))) for one in streams]
+    assert len(set(drawn)) == len(streams)
+    assert drawn[0] == float(torch.rand(1, generator=noise_stream(0, 0, 0, 0)))
+
+
+def test_noisy_latents_are_the_latents_and_their_noise_at_their_times(batch):
+    (part,) = parts_of(batch)
+    tau = part.inputs.flow_time[..., None, None, None]
+    torch.testing.assert_close(part.inputs.noisy_rgb, (1 - tau) * part.inputs.rgb + tau * part.noise)
+
+
+def test_a_chunk_has_one_flow_time():
+    span = SequenceSpan(row=0, start=0, length=8, chunk_size=3)  # chunks: 0 | 1 2 3 | 4 5 6 | 7
+    times = chunk_flow_times(span, SHIFT, torch.Generator().manual_seed(0)).tolist()
+    assert times[1] == times[2] == times[3]
+    assert times[4] == times[5] == times[6]
+    assert len(set(times)) == 4
+    assert all(0 <= time <= 1 for time in times)
+
+
+def test_sequences_stand_where_the_batch_says(batch):
+    assert spans_of(batch)[2] == SequenceSpan(row=1, start=4, length=2, chunk_size=4)

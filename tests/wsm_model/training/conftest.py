@@ -1,0 +1,102 @@
+"""A loader of random batches, and a run over it in this process."""
+
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+import torch
+
+from wsm_model.training.config import OptimiserConfig, Precision, TrainingConfig
+from wsm_model.training.schedule import make_optimiser
+from wsm_model.training.trainer import Hooks, resume, train
+
+ROWS, FRAMES = 4, 6
+
+
+class RandomLoader:
+    """Steps of an endless epoch; each is a pure function of its number."""
+
+    def __init__(self, make_poses: Callable[..., torch.Tensor], spoil: dict[int, str] | None = None):
+        self.steps = 1000
+        self.step = 0
+        self._make_poses, self._spoil = make_poses, spoil or {}
+
+    def __iter__(self) -> Iterator[SimpleNamespace]:
+        while self.step < self.steps:
+            batch = self._batch(self.step)
+            self.step += 1
+            yield batch
+
+    def state_dict(self) -> dict[str, int]:
+        return {"step": self.step}
+
+    def load_state_dict(self, state: dict[str, int]) -> None:
+        self.step = state["step"]
+
+    def _batch(self, step: int) -> SimpleNamespace:
+        generator = torch.Generator().manual_seed(step)
+        latents = (ROWS, FRAMES, 6, 4, 6)
+        batch = SimpleNamespace(
+            rgb=torch.randn(latents, generator=generator),
+            depth=torch.randn(latents, generator=generator),
+            poses=self._make_poses(ROWS, FRAMES, 4, generator=generator),
+            row=torch.arange(ROWS),
+            start=torch.zeros(ROWS, dtype=torch.int64),
+            lengths=torch.tensor([6, 5, 6, 3]),
+            chunk_size=torch.tensor([1, 2, 3, 4]),
+            goal_camera0_m=torch.randn(ROWS, 3, generator=generator),
+            refs=torch.arange(ROWS) + ROWS * step,
+            keys=tuple(f"clip {step}/{row}" for row in range(ROWS)),
+            epoch=0,
+            step=step,
+        )
+        if step in self._spoil:
+            getattr(batch, self._spoil[step])[1, 2] = float("nan")
+        return batch
+
+
+class Stop(Exception):
+    """Ends a run in the middle, as a kill would."""
+
+
+@pytest.fixture
+def make_loader(make_poses) -> Callable[..., RandomLoader]:
+    """Builds a loader; `spoil` puts a NaN into a tensor of a step."""
+    return lambda spoil=None: RandomLoader(make_poses, spoil)
+
+
+@pytest.fixture
+def settings() -> TrainingConfig:
+    """Six steps in float32 with a checkpoint after every second."""
+    return TrainingConfig(
+        max_steps=6,
+        precision=Precision.FLOAT32,
+        checkpoint_every=2,
+        optimiser=OptimiserConfig(learning_rate=1e-3, final_learning_rate=1e-4),
+    )
+
+
+@pytest.fixture
+def run(make_model, make_loader):
+    """Trains a new model in a folder, from its checkpoints if it has any; returns model and metrics."""
+
+    def train_in(folder: Path, config: TrainingConfig, *, kill_after: int = 0, spoil=None, identity=None):
+        model, loader = make_model(), make_loader(spoil)
+        optimiser = make_optimiser(model, config.optimiser)
+        identity = identity or {"model": "small"}
+        done = resume(folder, model, optimiser, loader, identity)
+        lines: list[dict[str, float]] = []
+
+        def metrics(step: int, values: dict[str, float]) -> None:
+            lines.append({"step": step, **values})
+            if step == kill_after:
+                raise Stop
+
+        hooks = Hooks(metrics=metrics, sample=lambda _step: None, progress=lambda _done: None)
+        with suppress(Stop):
+            train(model, loader, config, folder=folder, identity=identity, hooks=hooks, optimiser=optimiser, done=done)
+        return model, lines
+
+    return train_in
