@@ -6,9 +6,9 @@ of a batch goes back to a pool when the last tensor or array that looks at it is
 
 import mmap
 import weakref
-from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
+from queue import Empty, SimpleQueue
 
 import numpy as np
 import torch
@@ -19,6 +19,9 @@ _HUGE_PAGE_BYTES = 2 << 20
 _ROUNDING_SHARE = 8
 """Sizes are rounded up to a multiple of an eighth of themselves, so that slightly longer batches find their memory."""
 
+_PATIENCE_S = 2e-3
+"""Who trains lets go of the last batch some microseconds after the next one is delivered."""
+
 Memory = np.ndarray
 """A block of bytes; uint8 [size]."""
 
@@ -26,14 +29,15 @@ Memory = np.ndarray
 class BufferPool:
     """Hands out memory and takes it back on its own. Safe to be used by several threads.
 
-    No lock is taken: memory comes back wherever the garbage collector happens to run.
+    Memory comes back wherever the garbage collector happens to run, so nothing here waits for a lock then.
     """
 
-    def __init__(self, *, keep: int, pinned: bool = False):
+    def __init__(self, *, blocks: int, pinned: bool = False):
         """Start without any memory.
 
         Args:
-            keep: most blocks that are kept for later; what comes back beyond that is given to the system.
+            blocks: blocks that are enough for who lets go of one batch when given the next. A further one is made only
+                when none comes back within a moment, for those who keep batches, and not kept when it comes back.
             pinned: page-locked memory, from which a GPU copies while the processor does other things.
 
         Raises:
@@ -42,7 +46,9 @@ class BufferPool:
         if pinned and not torch.cuda.is_available():
             raise ConfigError("pin_memory needs a CUDA device, and torch finds none; leave it out")
         self._allocate: Callable[[int], Memory] = _pinned_memory if pinned else _page_memory
-        self._free: deque[Memory] = deque(maxlen=keep)
+        self._free: SimpleQueue[Memory] = SimpleQueue()  # may be filled while this thread is about to take from it
+        self._blocks: set[int] = set()  # by id
+        self._kept = self._enough = blocks
         self._block_bytes = 0
 
     def take(self, size_bytes: int) -> torch.Tensor:
@@ -61,15 +67,25 @@ class BufferPool:
     def _reused(self, size_bytes: int) -> Memory:
         while True:
             try:
-                memory = self._free.pop()  # the last one that came back: what is still in the cache is fastest
-            except IndexError:
-                return self._allocate(self._block_bytes)
+                memory = self._free.get(timeout=_PATIENCE_S if len(self._blocks) >= self._enough else 0)
+            except Empty:
+                return self._new()
             if len(memory) >= size_bytes:
                 return memory
+            self._blocks.discard(id(memory))
+
+    def _new(self) -> Memory:
+        if len(self._blocks) >= self._enough:
+            self._enough *= 2  # somebody keeps batches: do not wait for each
+        memory = self._allocate(self._block_bytes)
+        self._blocks.add(id(memory))
+        return memory
 
     def _give_back(self, memory: Memory) -> None:
-        if len(memory) == self._block_bytes:
-            self._free.append(memory)
+        if len(memory) == self._block_bytes and len(self._blocks) <= self._kept:
+            self._free.put(memory)
+        else:
+            self._blocks.discard(id(memory))
 
 
 def _rounded(size_bytes: int) -> int:

@@ -61,7 +61,7 @@ class StepReader:
             _LOG.warning("latents of all sources are standardised by the statistics of the first, %s", manifest.name)
         self._converts = self._dtype is not _STORED or bool(self._standardise)
         self._verification = Verification(read.verify, [len(table) for table in sources.tables])
-        self._pool = BufferPool(keep=read.prefetch_batches + 1, pinned=read.pin_memory)
+        self._pool = BufferPool(blocks=max(read.prefetch_batches, 1) + 1, pinned=read.pin_memory)
         self._staging = threading.local()
         self._readers = open_readers(sources, read)
         self._looking_ahead = [item for item in dict.fromkeys(self._readers) if not isinstance(item, LocalShards)]

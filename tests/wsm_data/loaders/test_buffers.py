@@ -8,13 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wsm_data.errors import ConfigError
+from wsm_data.loaders import buffers
 from wsm_data.loaders.buffers import BufferPool
 
 MIB = 1 << 20
 
 
 def test_memory_is_used_again_when_nobody_looks_at_it():
-    pool = BufferPool(keep=2)
+    pool = BufferPool(blocks=2)
     places = set()
     for _ in range(5):
         block = pool.take(3 * MIB)
@@ -36,7 +37,7 @@ def test_memory_is_used_again_when_nobody_looks_at_it():
     ids=["slice", "other dtype", "array", "slice of an array", "memoryview", "strided"],
 )
 def test_memory_that_somebody_looks_at_is_not_used_again(look):
-    pool = BufferPool(keep=4)
+    pool = BufferPool(blocks=4)
     block = pool.take(MIB)
     block.fill_(7)
     view = look(block)
@@ -51,33 +52,46 @@ def test_memory_that_somebody_looks_at_is_not_used_again(look):
 
 
 def test_memory_starts_at_a_page_and_has_the_size_that_was_asked_for():
-    block = BufferPool(keep=1).take(12345)
+    block = BufferPool(blocks=1).take(12345)
     assert block.data_ptr() % 4096 == 0
     assert (block.shape, block.dtype) == ((12345,), torch.uint8)
 
 
 def test_memory_too_small_for_what_is_asked_is_let_go():
-    pool = BufferPool(keep=3)
+    pool = BufferPool(blocks=3)
     small = pool.take(MIB)
     small.fill_(1)
     large = pool.take(40 * MIB)
     large.fill_(2)
     del small, large
     assert pool.take(39 * MIB).numel() == 39 * MIB
-    assert len(pool._free) <= 1  # the small block is gone, the large one was lent again or lies there
+    assert pool._free.qsize() <= 1  # the small block is gone, the large one was lent again or lies there
 
 
 def test_no_more_is_kept_than_was_said():
-    pool = BufferPool(keep=2)
-    blocks = [pool.take(MIB) for _ in range(6)]
-    del blocks
-    assert len(pool._free) == 2
+    pool = BufferPool(blocks=2)
+    held = [pool.take(MIB) for _ in range(6)]
+    assert len(pool._blocks) == 6
+    del held
+    assert pool._free.qsize() == len(pool._blocks) <= 2
+
+
+def test_memory_that_comes_back_in_a_moment_is_waited_for(monkeypatch):
+    """A thread that reads ahead does not take more memory because it was faster than the caller."""
+    monkeypatch.setattr(buffers, "_PATIENCE_S", 5.0)  # a busy machine may take long over a moment
+    pool = BufferPool(blocks=1)
+    held = [pool.take(MIB)]
+    place = held[0].data_ptr()
+    timer = threading.Timer(2e-4, held.clear)
+    timer.start()
+    assert pool.take(MIB).data_ptr() == place
+    timer.join()
 
 
 @given(st.lists(st.tuples(st.integers(1, 9 * MIB), st.integers(0, 4)), min_size=1, max_size=25))
 def test_what_is_held_is_never_overwritten(steps):
     """Any sequence of taking, holding and letting go; each block holds a number of its own to its end."""
-    pool = BufferPool(keep=2)
+    pool = BufferPool(blocks=2)
     held: list[tuple[torch.Tensor, int]] = []
     for number, (size, letting_go) in enumerate(steps):
         block = pool.take(size)
@@ -90,7 +104,7 @@ def test_what_is_held_is_never_overwritten(steps):
 
 
 def test_threads_never_share_a_block():
-    pool = BufferPool(keep=3)
+    pool = BufferPool(blocks=3)
     clashes = []
 
     def work(number: int) -> None:
@@ -110,7 +124,7 @@ def test_threads_never_share_a_block():
 
 
 def test_blocks_outlive_their_pool():
-    pool = BufferPool(keep=2)
+    pool = BufferPool(blocks=2)
     block = pool.take(MIB)
     block.fill_(5)
     del pool
@@ -121,12 +135,12 @@ def test_blocks_outlive_their_pool():
 @pytest.mark.skipif(torch.cuda.is_available(), reason="there is a GPU here")
 def test_page_locked_memory_needs_a_gpu():
     with pytest.raises(ConfigError, match="pin_memory needs a CUDA device"):
-        BufferPool(keep=1, pinned=True)
+        BufferPool(blocks=1, pinned=True)
 
 
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a GPU")
 def test_page_locked_memory_is_used_again_too():
-    pool = BufferPool(keep=1, pinned=True)
+    pool = BufferPool(blocks=1, pinned=True)
     block = pool.take(MIB)
     place = block.data_ptr()
     assert block.is_pinned()

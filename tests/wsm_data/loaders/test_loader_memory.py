@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from wsm_data.loaders import buffers
 from wsm_data.loaders.loader import ClipLoader
 
 WARM_UP_EPOCHS, EPOCHS = 5, 20
@@ -61,8 +62,9 @@ def test_epochs_that_are_broken_off_leave_nothing_behind(make_loader):
     assert (_open_files(), threading.active_count()) == (files, threads)
 
 
-def test_few_blocks_serve_all_batches(make_loader):
-    """One the caller holds, one that is delivered, and those that are read ahead."""
+def test_few_blocks_serve_all_batches(make_loader, monkeypatch):
+    """One the caller holds, and those that are read ahead."""
+    monkeypatch.setattr(buffers, "_PATIENCE_S", 5.0)  # a busy machine may take long over a moment
     loader = make_loader(threads=1, prefetch_batches=2, standardise=False, dtype="float16")
     _epochs(loader, 1)
     places = set()
@@ -70,4 +72,4 @@ def test_few_blocks_serve_all_batches(make_loader):
         for batch in loader:
             places.add(batch.rgb.data_ptr())
     del batch
-    assert len(places) <= 4
+    assert len(places) <= 3
