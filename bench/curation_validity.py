@@ -1,7 +1,7 @@
 """Does the default rule of `wsm select` find planted difficulties: a narrow door, a detour, a dead end, clutter?
 
-The weights of the rule were chosen on homes of the first of TUNING_SEEDS. On homes of the second, their plain mean found
-narrow doors with 0.940 only, upon which the rule got its emphasis, chosen on the first again. What is written here is
+The weights of the rule were chosen on homes of the first of TUNING_SEEDS. On homes of the second their plain mean found
+narrow doors with 0.940, upon which the rule got its emphasis, chosen on the first again. What is written here is
 measured on homes of REPORT_SEED. Difficulty is planted by construction (bench/planted_homes.py); the rule sees scores.
 """
 
