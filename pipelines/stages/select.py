@@ -1,6 +1,5 @@
 """`wsm select`: the hard share of a release as a list of clips, with the reasons."""
 
-import hashlib
 import logging
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -10,6 +9,7 @@ from typing import Any
 
 import fsspec
 import pyarrow as pa
+import xxhash
 
 from pipelines.command_text import command_text
 from pipelines.config import settings_of
@@ -34,6 +34,7 @@ from wsm_data.shards.selection import (
 
 _LOG = logging.getLogger(__name__)
 _UNIT = "selection"
+_READ_BYTES = 4 << 20
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,7 +68,7 @@ class SelectConfig(SelectionConfig):
 
 def _list_units(config: SelectConfig) -> Sequence[Unit]:
     digest = release_digest(read_manifest(open_store(config.release)))
-    return [Unit(id=_UNIT, inputs={"manifest": digest, "scores": _scores_sha256(config.scores_location)})]
+    return [Unit(id=_UNIT, inputs={"manifest": digest, "scores": _scores_digest(config.scores_location)})]
 
 
 def _process(batch: Sequence[Unit], config: SelectConfig, context: StageContext) -> Iterator[Outcome]:
@@ -113,13 +114,13 @@ def install_selection(path: Path, config: SelectConfig) -> None:
 
 
 def _selection(
-    config: SelectConfig, scores: ScoreTable, index: pa.Table, chosen: ChosenClips, scores_sha256: str
+    config: SelectConfig, scores: ScoreTable, index: pa.Table, chosen: ChosenClips, scores_digest: str
 ) -> Selection:
     keys = index["key"].take(pa.array(chosen.rows))
     return Selection(
         name=config.name,
         release_digest=scores.release_digest,
-        rule=_rule(config, scores, chosen, scores_sha256),
+        rule=_rule(config, scores, chosen, scores_digest),
         command=command_text("wsm select RELEASE", config, SelectConfig(release=config.release)),
         keys=pa.concat_arrays(keys.chunks),
         scores=chosen.difficulty,
@@ -127,11 +128,11 @@ def _selection(
     )
 
 
-def _rule(config: SelectConfig, scores: ScoreTable, chosen: ChosenClips, scores_sha256: str) -> dict[str, Any]:
+def _rule(config: SelectConfig, scores: ScoreTable, chosen: ChosenClips, scores_digest: str) -> dict[str, Any]:
     """Everything the choice depended on, defaults written out, and what became of the clips."""
     return {
         "settings": settings_of(config),
-        "scores_sha256": scores_sha256,
+        "scores_digest": scores_digest,
         "scores": {
             one.name: {"unit": one.unit, "direction": one.direction.value, "version": one.version}
             for one in scores.scorers
@@ -147,12 +148,16 @@ def _rule(config: SelectConfig, scores: ScoreTable, chosen: ChosenClips, scores_
     }
 
 
-def _scores_sha256(location: str) -> str:
+def _scores_digest(location: str) -> str:
+    """xxh3_128 of the file, in hexadecimal, by which scores are told apart; parquet's checksums vouch for its pages."""
+    digest = xxhash.xxh3_128()
     try:
         with fsspec.open(location, "rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
+            while block := file.read(_READ_BYTES):
+                digest.update(block)
     except FileNotFoundError as error:
         raise ConfigError(f"there are no scores at {location}; run `wsm score RELEASE` first") from error
+    return str(digest.hexdigest())
 
 
 STAGE = Stage(name="select", version=1, config_type=SelectConfig, list_units=_list_units, process=_process)

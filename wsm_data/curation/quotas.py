@@ -135,15 +135,16 @@ def _require_known(kind: str, quota: Quota, values: list[str]) -> None:
 
 def _require_possible(table: QuotaTable, count: int) -> None:
     places = range(len(table.names))
-    available = np.bincount(table.codes.ravel(), minlength=len(table.names))
+    counts = [np.bincount(codes, minlength=len(table.names)) for codes in table.codes]
+    available = np.sum(counts, axis=0)
     for place in places:
         if table.least[place] > min(table.most[place], available[place]):
             raise ConfigError(
                 f"the quota of {table.names[place]} cannot be met: at least {table.least[place]} clips and at most "
                 f"{table.most[place]}, of {available[place]} candidates"
             )
-    for kind, codes in zip(QUOTA_COLUMNS, table.codes, strict=True):
-        of_kind = np.unique(codes)
+    for kind, count_of_kind in zip(QUOTA_COLUMNS, counts, strict=True):
+        of_kind = np.flatnonzero(count_of_kind)
         if table.least[of_kind].sum() > count:
             raise ConfigError(
                 f"the quotas.{kind} cannot be met: they ask for at least {table.least[of_kind].sum()} clips together, "
