@@ -37,16 +37,28 @@ def index_table(rows: Iterable[IndexRow]) -> pa.Table:
 def write_index(path: Path, table: pa.Table) -> None:
     """Write the index atomically; equal rows and an equal pyarrow give equal bytes."""
     texts = {*UNIQUE_COLUMNS, *REPEATED_COLUMNS}
-    with atomic_file(path) as file:
-        pq.write_table(
-            table.combine_chunks(),
+    with (
+        atomic_file(path) as file,
+        pq.ParquetWriter(
             file,
+            SCHEMA,
             write_page_checksum=True,
-            row_group_size=_ROW_GROUP_ROWS,
             compression={name: "zstd" if name in texts else "none" for name in SCHEMA.names},
             use_dictionary=list(REPEATED_COLUMNS),
             column_encoding=dict.fromkeys((*COUNT_COLUMNS, *PLACE_COLUMNS), "DELTA_BINARY_PACKED"),
-        )
+        ) as writer,
+    ):
+        for first in range(0, len(table), _ROW_GROUP_ROWS):
+            writer.write_table(_with_own_values(table.slice(first, _ROW_GROUP_ROWS)))
+
+
+def _with_own_values(part: pa.Table) -> pa.Table:
+    """The same rows; repeated columns list only their own values, since every group of a file has a list of its own."""
+    part = part.combine_chunks()
+    for name in REPEATED_COLUMNS:
+        column = part[name].cast(pa.string()).dictionary_encode()
+        part = part.set_column(part.schema.get_field_index(name), part.schema.field(name), column)
+    return part
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,10 +90,14 @@ class IndexTable:
 
     def codes(self, column: str) -> tuple[np.ndarray, tuple[str, ...]]:
         """A repeated text column, such as `split`, as numbers into its values: int32 [rows], and the values."""
-        chunks = self.columns([column]).unify_dictionaries()[column].chunks
-        if not chunks:
-            return np.empty(0, np.int32), ()
-        return np.concatenate([chunk.indices.to_numpy() for chunk in chunks]), tuple(chunks[0].dictionary.to_pylist())
+        parts = self.content.parts(column) if isinstance(self.content, IndexFile) else [self.content[column]]
+        numbers: dict[str, int] = {}
+        codes = [np.empty(0, np.int32)]
+        for chunk in (chunk for part in parts for chunk in part.chunks if len(chunk)):
+            values = chunk.dictionary.to_pylist()
+            renumbered = np.array([numbers.setdefault(value, len(numbers)) for value in values], np.int32)
+            codes.append(renumbered[chunk.indices.to_numpy()])
+        return np.concatenate(codes), tuple(numbers)
 
     def counts(self, column: str) -> dict[str, int]:
         """How many clips have each value of a repeated text column, sorted by value."""

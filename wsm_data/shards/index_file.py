@@ -56,6 +56,17 @@ class IndexFile:
         with self._opened() as file:
             return self._parquet(file).read(list(names)).select(list(names))
 
+    def parts(self, name: str) -> Iterator[pa.ChunkedArray]:
+        """A column group by group. Read at once, each part of a dictionary column would repeat all values before it.
+
+        Raises:
+            IntegrityError: a page is damaged.
+        """
+        with self._opened() as file:
+            parquet = self._parquet(file)
+            for group in range(self._metadata.num_row_groups):
+                yield parquet.read_row_group(group, [name], use_threads=False)[name]
+
     def values(self, names: Sequence[str], rows: np.ndarray) -> list[np.ndarray]:
         """Some columns at some rows, in the order of `rows`; texts as arrays of objects. Rows around them are kept.
 
