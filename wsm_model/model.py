@@ -14,7 +14,7 @@ from wsm_model.config import Expert, ModelConfig
 from wsm_model.inputs import ModelInputs, ModelOutputs
 from wsm_model.layers.pose import identity_poses
 from wsm_model.mot.attention import JointTokens, attend_densely
-from wsm_model.mot.attention_blocks import PREDICTION, attend_by_blocks
+from wsm_model.mot.attention_blocks import PREDICTION, attend_by_blocks, plan_blocks
 from wsm_model.mot.attention_flex import attend_flexibly, block_mask
 from wsm_model.mot.chunks import FrameTable
 from wsm_model.mot.expert import Stream
@@ -103,7 +103,7 @@ class WorldSlamModel(MixtureOfTransformers):
         if kind is Attention.FLEX:
             evaluate = partial(attend_flexibly, mask=block_mask(self.config, table, device))
         elif kind is Attention.BLOCKS:
-            evaluate = partial(attend_by_blocks, spans=inputs.spans, variant=self.config.variant)
+            evaluate = partial(attend_by_blocks, plan=plan_blocks(self.config, inputs.spans, device))
         else:
             evaluate = partial(attend_densely, mask_BLL=dense_mask(self.config, table))
         return lambda _layer, tokens: evaluate(tokens)

@@ -1,91 +1,174 @@
-"""What runs on a CPU: the mask's blocks one by one, without a mask.
+"""What runs on a CPU: the parts of the mask that hold anything, a few frames of queries at a time.
 
-Along the chunks of one sequence every row of the table is a plain attention over stretches of earlier tokens: clean
-tokens of latent i over clean tokens up to i, noisy tokens of a chunk over all clean tokens before it and over itself,
-and so on. Only pairs that see each other are evaluated, and nothing of L x L is stored.
+Queries of some consecutive frames see, of each kind of key, one stretch of frames: from the table follows where it
+ends. So a block of queries is one attention over the stretches that its kind may see, with the table's own cells as a
+mask inside. What lies beyond is never evaluated, and nothing of L x L is stored. Sequences of one length share every block,
+whatever their chunk sizes. The blocks are planned once for all layers.
+
+Shape suffixes: B rows, F latent frames, P tokens of a frame, H heads, d width of a head.
 """
 
 from collections import defaultdict
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import torch
 from torch import Tensor
 from torch.nn.functional import scaled_dot_product_attention
 
-from wsm_model.config import Expert, Variant
+from wsm_model.config import Expert, ModelConfig
 from wsm_model.mot.attention import Attended, JointTokens, QueriesKeysValues
-from wsm_model.mot.chunks import SequenceSpan, chunk_bounds
+from wsm_model.mot.chunks import SequenceSpan, chunk_numbers
+from wsm_model.mot.mask import RULES, Rule, TokenKind, allowed
 
 CLEAN, PREDICTION = 0, 1
+_BLOCK_TOKENS = 256
+"""Queries of a block, about: enough for matrix products to pay, few enough that little is evaluated for nothing."""
+
+_RGB_KINDS = (TokenKind.CLEAN_RGB, TokenKind.NOISY_RGB)
+_COPY = {
+    TokenKind.CLEAN_RGB: CLEAN,
+    TokenKind.CLEAN_STATE: CLEAN,
+    TokenKind.NOISY_RGB: PREDICTION,
+    TokenKind.STATE_QUERY: PREDICTION,
+}
 
 
-def attend_by_blocks(tokens: JointTokens, spans: Sequence[SequenceSpan], variant: Variant) -> Attended:
+@dataclass(frozen=True, kw_only=True)
+class QueryBlock:
+    """Queries of one kind in consecutive frames, and all that they see.
+
+    Attributes:
+        kind: of the queries.
+        frames: their frames, from the start of the sequence.
+        seen: kinds of keys with the frames of each that any of the queries sees.
+        mask: which tokens see which, bool [b, 1, queries, keys]; b is 1 where all sequences agree, and it is None where
+            all see all.
+    """
+
+    kind: TokenKind
+    frames: slice
+    seen: tuple[tuple[TokenKind, slice], ...]
+    mask: Tensor | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class SequenceGroup:
+    """Sequences that stand at the same place in their rows, and have one length.
+
+    Attributes:
+        rows: their rows.
+        place: their frames in the row.
+        blocks: what is evaluated.
+    """
+
+    rows: tuple[int, ...]
+    place: slice
+    blocks: tuple[QueryBlock, ...]
+
+
+def plan_blocks(config: ModelConfig, spans: Sequence[SequenceSpan], device: torch.device) -> tuple[SequenceGroup, ...]:
+    """The blocks of a batch, the same in every layer."""
+    alike: dict[tuple[int, int], list[SequenceSpan]] = defaultdict(list)
+    for span in sorted(spans):
+        alike[span.start, span.length].append(span)
+    return tuple(
+        SequenceGroup(
+            rows=tuple(span.row for span in group),
+            place=slice(start, start + length),
+            blocks=_blocks(config, length, [span.chunk_size for span in group], device),
+        )
+        for (start, length), group in alike.items()
+    )
+
+
+def attend_by_blocks(tokens: JointTokens, plan: Sequence[SequenceGroup]) -> Attended:
     """Joint attention of clean and prediction copies under the mask of `wsm_model.mot.mask`.
 
     Args:
-        tokens: of every expert, G = 2: clean, prediction.
-        spans: the sequences of the batch.
-        variant: whose table.
+        tokens: of every expert, [B, G, F, P, H, d] with G = 2: clean, prediction.
+        plan: of `plan_blocks`.
 
     Returns:
         What each token gathered; zeros for padding.
     """
-    rgb = tokens[Expert.GENERATION]
-    state = _join([part for expert, part in tokens.items() if expert is not Expert.GENERATION])
-    gathered_rgb, gathered_state = torch.zeros_like(rgb.queries), torch.zeros_like(state.queries)
-    for (start, length, chunk_size), rows in _alike(spans).items():
-        place = slice(start, start + length)
-        found = _attend_sequence(_part(rgb, rows, place), _part(state, rows, place), chunk_size, variant)
-        if rows == list(range(len(gathered_rgb))) and length == gathered_rgb.shape[2]:
-            gathered_rgb, gathered_state = found
-        else:
-            gathered_rgb = _put(gathered_rgb, found[0], rows, place)
-            gathered_state = _put(gathered_state, found[1], rows, place)
-    return {Expert.GENERATION: gathered_rgb, **_split(gathered_state, tokens)}
-
-
-def _alike(spans: Sequence[SequenceSpan]) -> dict[tuple[int, int, int], list[int]]:
-    """Rows whose sequences have one place, length and chunk size are attended together."""
-    rows = defaultdict(list)
-    for span in sorted(spans):
-        rows[span.start, span.length, span.chunk_size].append(span.row)
-    return dict(rows)
-
-
-def _attend_sequence(
-    rgb: QueriesKeysValues, state: QueriesKeysValues, chunk_size: int, variant: Variant
-) -> tuple[Tensor, Tensor]:
-    frames = rgb.queries.shape[2]
-    clean_rgb = [_over(rgb, CLEAN, slice(i, i + 1), [(rgb, CLEAN, i + 1)]) for i in range(frames)]
-    clean_state = [_over(state, CLEAN, slice(i, i + 1), [(state, CLEAN, i + 1)]) for i in range(frames)]
-    noisy, queries = [], []
-    for first, end in chunk_bounds(frames, chunk_size):
-        own = slice(first, end)
-        past_state = [(state, CLEAN, first)]
-        seen_by_noisy = [(rgb, CLEAN, first), *(past_state if variant is Variant.SLAM else [])]
-        noisy.append(_over(rgb, PREDICTION, own, seen_by_noisy))
-        queries.append(_over(state, PREDICTION, own, [(rgb, CLEAN, end), *past_state]))
-    return (
-        torch.stack([torch.cat(clean_rgb, dim=1), torch.cat(noisy, dim=1)], dim=1),
-        torch.stack([torch.cat(clean_state, dim=1), torch.cat(queries, dim=1)], dim=1),
+    parts = (
+        tokens[Expert.GENERATION],
+        _join([part for expert, part in tokens.items() if expert is not Expert.GENERATION]),
     )
+    whole = [torch.zeros_like(part.queries) for part in parts]
+    for group in plan:
+        covers_all = group.rows == tuple(range(len(whole[0]))) and group.place == slice(0, whole[0].shape[2])
+        found = _attend_group([_part(part, group) for part in parts], group)
+        whole = found if covers_all else [_put(old, new, group) for old, new in zip(whole, found, strict=True)]
+    return {Expert.GENERATION: whole[0], **_split(whole[1], tokens)}
 
 
-def _over(part: QueriesKeysValues, copy: int, frames: slice, seen: list[tuple[QueriesKeysValues, int, int]]) -> Tensor:
-    """What one copy of some frames gathers from the first frames of others, and from itself if it is a prediction."""
-    stretches = [(other, kind, slice(0, end)) for other, kind, end in seen if end]
-    if copy == PREDICTION:
-        stretches.append((part, PREDICTION, frames))
-    queries = part.queries[:, copy, frames]
-    keys = torch.cat([_sequence(other.keys[:, kind, place]) for other, kind, place in stretches], dim=2)
-    values = torch.cat([_sequence(other.values[:, kind, place]) for other, kind, place in stretches], dim=2)
-    found = scaled_dot_product_attention(_sequence(queries), keys, values)
-    return found.transpose(1, 2).reshape(queries.shape)
+def _blocks(config: ModelConfig, length: int, chunk_sizes: list[int], device: torch.device) -> tuple[QueryBlock, ...]:
+    latent = torch.arange(length)
+    chunk = torch.stack([chunk_numbers(latent, torch.tensor(size)) for size in chunk_sizes])
+    chunk = chunk[:1] if len(set(chunk_sizes)) == 1 else chunk
+    found = []
+    for kind in TokenKind:
+        frames_a_block = max(1, _BLOCK_TOKENS // _tokens(config, kind))
+        for first in range(0, length, frames_a_block):
+            found.append(_block(config, kind, slice(first, min(length, first + frames_a_block)), latent, chunk, device))
+    return tuple(found)
 
 
-def _sequence(x_BFPHd: Tensor) -> Tensor:
-    """Tokens of some frames as one sequence per head, [B, H, F P, d]."""
-    return x_BFPHd.flatten(1, 2).transpose(1, 2)
+def _block(
+    config: ModelConfig, kind: TokenKind, frames: slice, latent: Tensor, chunk: Tensor, device: torch.device
+) -> QueryBlock:
+    """One block; the frames of a kind of keys are those between the first and the last that any query sees."""
+    seen, masks = [], []
+    for key_kind in TokenKind:
+        rule = RULES[config.variant].get((kind, key_kind), Rule.NEVER)
+        visible = allowed(
+            torch.tensor(int(rule)),
+            latent=(latent[frames, None], latent[None, :]),
+            chunk=(chunk[:, frames, None], chunk[:, None, :]),
+        ).expand(len(chunk), -1, -1)
+        columns = visible.any(dim=(0, 1)).nonzero().flatten().tolist()
+        if columns:
+            place = slice(columns[0], columns[-1] + 1)
+            seen.append((key_kind, place))
+            masks.append(visible[:, :, place].repeat_interleave(_tokens(config, key_kind), dim=2))
+    mask = torch.cat(masks, dim=2).repeat_interleave(_tokens(config, kind), dim=1)[:, None]
+    return QueryBlock(kind=kind, frames=frames, seen=tuple(seen), mask=None if mask.all() else mask.to(device))
+
+
+def _tokens(config: ModelConfig, kind: TokenKind) -> int:
+    """Tokens of a frame of this kind."""
+    if kind in _RGB_KINDS:
+        return config.tokens[Expert.GENERATION]
+    return sum(config.tokens[expert] for expert in config.state_experts)
+
+
+def _attend_group(parts: Sequence[QueriesKeysValues], group: SequenceGroup) -> list[Tensor]:
+    """What RGB and state tokens of some sequences gather, [b, 2, F, P, H, d] each."""
+    gathered: dict[TokenKind, list[Tensor]] = {kind: [] for kind in TokenKind}
+    for block in group.blocks:
+        own = parts[block.kind not in _RGB_KINDS]
+        queries = own.queries[:, _COPY[block.kind], block.frames]
+        keys, values = (
+            torch.cat([_of_kind(parts, name, kind)[:, place].flatten(1, 2) for kind, place in block.seen], dim=1)
+            for name in ("keys", "values")
+        )
+        found = scaled_dot_product_attention(
+            queries.flatten(1, 2).transpose(1, 2), keys.transpose(1, 2), values.transpose(1, 2), attn_mask=block.mask
+        )
+        gathered[block.kind].append(found.transpose(1, 2).reshape(queries.shape))
+    whole = {kind: torch.cat(pieces, dim=1) for kind, pieces in gathered.items()}
+    return [
+        torch.stack([whole[TokenKind.CLEAN_RGB], whole[TokenKind.NOISY_RGB]], dim=1),
+        torch.stack([whole[TokenKind.CLEAN_STATE], whole[TokenKind.STATE_QUERY]], dim=1),
+    ]
+
+
+def _of_kind(parts: Sequence[QueriesKeysValues], name: str, kind: TokenKind) -> Tensor:
+    """Keys or values of all frames of a kind, [b, F, P, H, d]."""
+    tensor: Tensor = getattr(parts[kind not in _RGB_KINDS], name)
+    return tensor[:, _COPY[kind]]
 
 
 def _join(parts: list[QueriesKeysValues]) -> QueriesKeysValues:
@@ -99,12 +182,12 @@ def _split(state: Tensor, tokens: JointTokens) -> Attended:
     return dict(zip(experts, pieces, strict=True))
 
 
-def _part(part: QueriesKeysValues, rows: list[int], place: slice) -> QueriesKeysValues:
-    everything = rows == list(range(len(part.queries)))
-    return QueriesKeysValues(*((x if everything else x[rows])[:, :, place] for x in part))
+def _part(part: QueriesKeysValues, group: SequenceGroup) -> QueriesKeysValues:
+    everything = group.rows == tuple(range(len(part.queries)))
+    return QueriesKeysValues(*((x if everything else x[list(group.rows)])[:, :, group.place] for x in part))
 
 
-def _put(whole: Tensor, found: Tensor, rows: list[int], place: slice) -> Tensor:
+def _put(whole: Tensor, found: Tensor, group: SequenceGroup) -> Tensor:
     filled = whole.clone()
-    filled[rows, :, place] = found
+    filled[list(group.rows), :, group.place] = found
     return filled
