@@ -2,8 +2,8 @@
 
 Queries of some consecutive frames see, of each kind of key, one stretch of frames: from the table follows where it
 ends. So a block of queries is one attention over the stretches that its kind may see, with the table's own cells as a
-mask inside. What lies beyond is never evaluated, and nothing of L x L is stored. Sequences of one length share every block,
-whatever their chunk sizes. The blocks are planned once for all layers.
+mask inside. What lies beyond is never evaluated, and nothing of L x L is stored. Sequences of one length share their
+blocks, whatever their chunk sizes. The blocks are planned once for all layers.
 
 Shape suffixes: B rows, F latent frames, P tokens of a frame, H heads, d width of a head.
 """
