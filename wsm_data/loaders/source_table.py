@@ -200,12 +200,12 @@ def open_sources(configs: Sequence[SourceConfig]) -> Sources:
 
 
 def _open_source(config: SourceConfig, release: Release, base: int) -> SourceTable:
-    rows, selection = np.arange(len(release.index)), ""
+    is_chosen = _is_of_split(config, release)
+    rows, selection = np.flatnonzero(is_chosen), ""
     if config.selection:
         chosen = read_selection(release.store, config.selection, release.digest)
         rows, selection = chosen.rows_of(release.index), chosen.name
-    if config.split:
-        rows = rows[_is_of_split(config, release)[rows]]
+        rows = rows[is_chosen[rows]]
     if not len(rows):
         wanted = f"split {config.split or 'any'}" + (f" and selection {selection}" if selection else "")
         raise ConfigError(f"a source must have clips, but {config.release} has none of {wanted}")
@@ -214,6 +214,8 @@ def _open_source(config: SourceConfig, release: Release, base: int) -> SourceTab
 
 def _is_of_split(config: SourceConfig, release: Release) -> np.ndarray:
     """For each row of the index, whether it is of the split of the source; bool [rows]."""
+    if not config.split:
+        return np.ones(len(release.index), np.bool_)
     codes, splits = release.index.codes("split")
     if config.split not in splits:
         raise ConfigError(

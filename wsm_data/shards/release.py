@@ -22,6 +22,7 @@ from wsm_data.shards.inventory import InventoryRow, parse_inventory, parse_quara
 from wsm_data.shards.manifest import ReleaseManifest, parse_manifest
 from wsm_data.shards.names import INDEX_NAME, INVENTORY_NAME, MANIFEST_NAME, QUARANTINE_NAME
 
+_HASHED_AT_ONCE_BYTES = 8 << 20
 _PLACES_IN_A_RUN = ("release", "pack/release")
 """Where a release lies in the folder of `wsm pack`, and in that of a run."""
 
@@ -190,9 +191,17 @@ def _load_index(store: Store) -> tuple[OpenFile, str]:
         return partial(pa.BufferReader, data), sha256_bytes(data)
     try:
         with local_file(f"{store.root}/{INDEX_NAME}") as (file, open_again):
-            return open_again, hashlib.file_digest(file, "sha256").hexdigest()
+            return open_again, _sha256(file)
     except FileNotFoundError as error:
         raise _missing(store, INDEX_NAME) from error
+
+
+def _sha256(file: pa.NativeFile) -> str:
+    """Digest of a file, in pieces so large that a busy interpreter in another thread does not hold it up."""
+    digest, buffer = hashlib.sha256(), memoryview(bytearray(min(file.size(), _HASHED_AT_ONCE_BYTES)))
+    while count := file.readinto(buffer):
+        digest.update(buffer[:count])
+    return digest.hexdigest()
 
 
 def _refuse_outer_folder(store: Store) -> None:
