@@ -84,18 +84,29 @@ def _print_audit(timeline: Timeline, sources: Sources | None, folder: Path) -> N
         )
     if timeline.ahead:
         typer.echo(f"the last session: rank 0 recorded {timeline.ahead} steps at its end that another rank has not")
+    beginning = _beginning(timeline)
+    if beginning:
+        typer.echo(f"the ledger begins with {beginning}: it says nothing of what came before")
     misfits = [*timeline.misfits, *(misfit for audit in audits for misfit in audit.misfits)]
     if not any(audit.recorded for audit in audits):
         misfits.append("at least one step must have been recorded by all ranks, found none")
     if misfits:
         raise IntegrityError(f"{folder} does not prove an uninterrupted course:\n  " + "\n  ".join(misfits))
-    typer.echo(_verdict(audits, compared=sources is not None))
+    typer.echo(_verdict(audits, beginning, compared=sources is not None))
+
+
+def _beginning(timeline: Timeline) -> str:
+    """Where a ledger begins that was switched on in mid-run; empty where it begins with the run, or has no start."""
+    first = timeline.epochs[0] if timeline.epochs else None
+    return f"step {first.start} of epoch {first.epoch}" if first and (first.epoch or first.start) else ""
 
 
 def _head(timeline: Timeline) -> str:
     order = recorded_order(timeline.identity)
     worlds = sorted({file.world_size for file in timeline.files})
     killed = sum(not file.closed for file in timeline.files)
+    torn_bytes = sum(file.torn_bytes for file in timeline.files)
+    torn = f", {torn_bytes:,} bytes of records that were cut short" if torn_bytes else ""
     rows = [("ledger of", "release", "split", "selection", "clips", "weight")]
     for source in timeline.identity["sources"]:
         names = (source["release"], source["release_digest"][:16], source["split"] or "all", source["selection"] or "-")
@@ -103,7 +114,7 @@ def _head(timeline: Timeline) -> str:
     return (
         aligned(rows, right=(4, 5))
         + f"\nseed {order.seed}, global batch {order.global_batch}, remainder {order.remainder}, {order.arrangement}; "
-        f"world size {', '.join(map(str, worlds))}; {len(timeline.files)} files, {killed} of them not closed"
+        f"world size {', '.join(map(str, worlds))}; {len(timeline.files)} files, {killed} of them not closed{torn}"
     )
 
 
@@ -131,11 +142,12 @@ def _explained(audit: EpochAudit) -> str:
     return ", ".join(f"{words}: {count:,}" for words, count in parts if count) or "every clip"
 
 
-def _verdict(audits: Sequence[EpochAudit], *, compared: bool) -> str:
+def _verdict(audits: Sequence[EpochAudit], beginning: str, *, compared: bool) -> str:
     complete = [audit.epoch for audit in audits if audit.complete]
     proof = (
         "every recorded step brought what the plan says"
         if compared
         else "the counts are those of the sources; --release compares every step with the plan"
     )
-    return f"{len(complete)} of {len(audits)} epochs complete, no step missing, none twice: {proof}"
+    since = f" from {beginning} on" if beginning else ""
+    return f"{len(complete)} of {len(audits)} epochs complete, no step missing{since}, none twice: {proof}"

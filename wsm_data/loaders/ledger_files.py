@@ -3,7 +3,9 @@
 A frame is a tag of four letters, the size of the payload (uint32), the payload, and the xxh3_64 of all that (uint64),
 little-endian. `SESS` comes first: JSON of who writes. `STRT` says that steps follow from (epoch, step) on, and how many
 the epoch has; `STEP` says which clips one step brought; `DONE` that the writer was closed. What a killed writer leaves
-behind the last whole frame is recognised and passed over; any other damage is refused.
+behind the last whole frame is recognised and passed over; any other damage is refused. A frame whose size was changed
+so that it reaches past the end looks like one that was cut short: it is refused where a whole frame follows, and the
+last frame of a file alone can be lost in this way, which counts as torn.
 """
 
 import json
@@ -27,6 +29,7 @@ CHECKSUM = struct.Struct("<Q")
 START_FIELDS = struct.Struct("<qqq")
 STEP_FIELDS = struct.Struct("<qq")
 _MAX_PAYLOAD_BYTES = 1 << 28  # a size beyond it is damage, not a frame that was cut
+_TAG = re.compile(b"(?=SESS|STRT|STEP|DONE)")
 _FILE_NAME = re.compile(r"rank-([0-9]{5,})-([0-9]{6,})\.ledger")
 
 
@@ -64,7 +67,7 @@ class LedgerFile:
         world_size: number of ranks.
         segments: in the order in which they were recorded.
         closed: whether the writer was closed; otherwise it was killed, or still writes.
-        torn_bytes: bytes of a last frame that was not written to its end.
+        torn_bytes: bytes behind the last whole frame: of one that was not written to its end.
     """
 
     path: Path
@@ -174,16 +177,30 @@ def _frame_at(data: memoryview, place: int, path: Path) -> tuple[bytes, memoryvi
     Zeros count as not written: a file system leaves them for blocks it had not written when power failed.
     """
     rest = data[place:]
-    tag, size = HEAD.unpack(rest[: HEAD.size]) if len(rest) >= HEAD.size else (b"", 0)
-    if tag not in (SESSION, START, STEP, DONE) or size > _MAX_PAYLOAD_BYTES:
-        size = 0
-    elif len(rest) >= HEAD.size + size + CHECKSUM.size:
-        end = HEAD.size + size
-        if CHECKSUM.unpack(rest[end : end + CHECKSUM.size])[0] == xxhash.xxh3_64_intdigest(rest[:end]):
-            return tag, rest[HEAD.size : end]
-    if len(bytes(rest).rstrip(b"\0")) < HEAD.size + size + CHECKSUM.size:
+    if (frame := _whole_frame(rest)) is not None:
+        return frame
+    is_cut = len(bytes(rest).rstrip(b"\0")) < _stated_bytes(rest)
+    if is_cut and not any(_whole_frame(rest[match.start() :]) for match in _TAG.finditer(rest, 1)):
         return None
     raise IntegrityError(
-        f"{path}: the record at byte {place} must have the checksum it was written with, found other bytes; "
-        "restore the file"
+        f"{path}: the record at byte {place} must have the size and the checksum it was written with, found other "
+        "bytes; restore the file"
     )
+
+
+def _stated_bytes(data: memoryview) -> int:
+    """Bytes of a whole frame that begins as `data` does; of one without payload where its head cannot be believed."""
+    tag, size = HEAD.unpack(data[: HEAD.size]) if len(data) >= HEAD.size else (b"", 0)
+    if tag not in (SESSION, START, STEP, DONE) or size > _MAX_PAYLOAD_BYTES:
+        size = 0
+    return HEAD.size + int(size) + CHECKSUM.size
+
+
+def _whole_frame(data: memoryview) -> tuple[bytes, memoryview] | None:
+    """Tag and payload of the frame that `data` begins with; None where there is none with the right checksum."""
+    end = _stated_bytes(data) - CHECKSUM.size
+    if len(data) < end + CHECKSUM.size:
+        return None
+    if CHECKSUM.unpack(data[end : end + CHECKSUM.size])[0] != xxhash.xxh3_64_intdigest(data[:end]):
+        return None
+    return bytes(data[:4]), data[HEAD.size : end]

@@ -3,6 +3,8 @@
 Each rank's files are in order by their number, so no clock is compared. A start at (epoch, step) overrides everything
 that was recorded from there on before: those steps were lost with the run that was killed. Rank 0 takes part in every
 session, so its starts are the timeline; the other ranks must have recorded the same stretch, from the same start on.
+Ranks share no name of their session, which would need communication: a rank's latest start of the same world size at
+the same place stands for it, whichever session it is of. Whatever it recorded must still be what the plan says.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -15,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wsm_data.errors import ConfigError, IntegrityError
-from wsm_data.loaders.ledger_files import LedgerFile, Segment, ledger_files, read_ledger_file
+from wsm_data.loaders.ledger_files import LedgerFile, Segment, file_name, ledger_files, read_ledger_file
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -69,6 +71,11 @@ class EpochRecord:
     stretches: tuple[Stretch, ...]
 
     @property
+    def start(self) -> int:
+        """First step that counts."""
+        return self.stretches[0].start
+
+    @property
     def recorded(self) -> int:
         """Steps that count."""
         return sum(stretch.end - stretch.start for stretch in self.stretches)
@@ -101,7 +108,7 @@ class Timeline:
 
 
 def read_timeline(folder: Path) -> Timeline:
-    """Read a ledger and put it in order.
+    """Read a ledger and put it in order. It may have been switched on in mid-run: it begins at the first start then.
 
     Raises:
         ConfigError: the folder holds no ledger.
@@ -127,7 +134,7 @@ def read_timeline(folder: Path) -> Timeline:
         again=tuple(_again(started, ends)),
         ahead=_counted((segment.start, end) for (_, segment), end in zip(started, ends, strict=True) if end is not None)
         - _counted((one.start, one.end) for one in stretches),
-        misfits=(*misfits, *_gaps(stretches)),
+        misfits=(*_missing_files(folder), *misfits, *_gaps(stretches)),
     )
 
 
@@ -147,6 +154,15 @@ def _read_files(folder: Path) -> tuple[LedgerFile, ...]:
                 f"{file.path} and {files[0].path} are of different runs; give each a ledger of its own"
             )
     return files
+
+
+def _missing_files(folder: Path) -> Iterator[str]:
+    """A rank numbers its files from 0 on, so that one that was taken away is missed, unless it is the last."""
+    present = ledger_files(folder)
+    for rank, number in present:
+        if number and (rank, number - 1) not in present:
+            name, earlier = file_name(rank, number), file_name(rank, number - 1)
+            yield f"{earlier} must be in the ledger, as {name} is, but it is not there; restore the file"
 
 
 def _live_ends(segments: Sequence[Segment]) -> list[int | None]:
@@ -224,8 +240,6 @@ def _gaps(stretches: Sequence[Stretch]) -> Iterator[str]:
     if not stretches:
         yield "rank 0 must have recorded where it started, but the ledger has no start of it"
         return
-    if stretches[0].start:
-        yield f"epoch {stretches[0].epoch}: the steps before {stretches[0].start} are not in the ledger"
     for one, following in pairwise(stretches):
         same_epoch = one.epoch == following.epoch
         if same_epoch and one.steps != following.steps:

@@ -72,6 +72,26 @@ def test_the_remainder_is_explained(tmp_path, tiny, capsys, remainder, explained
     assert explained in capsys.readouterr().out
 
 
+def test_a_ledger_that_was_switched_on_in_mid_run_proves_what_followed(tmp_path, tiny, capsys):
+    record(tmp_path / "ledger", tiny.folder, [(1, 2, 3), (2, 0, 3)])
+    audit(tmp_path / "ledger", releases=[str(tiny.folder)])
+    printed = capsys.readouterr().out
+    assert "the ledger begins with step 2 of epoch 1: it says nothing of what came before" in printed
+    assert re.search(r"1 +1 +3 .*not complete", printed)
+    assert printed.splitlines()[-1].startswith(
+        "1 of 2 epochs complete, no step missing from step 2 of epoch 1 on, none twice"
+    )
+
+
+def test_bytes_of_a_record_that_was_cut_short_are_counted(resumed, capsys):
+    audit(resumed)
+    assert "cut short" not in capsys.readouterr().out
+    with (resumed / "rank-00001-000000.ledger").open("ab") as file:
+        file.write(b"STEP" + bytes([16]))
+    audit(resumed)
+    assert "3 files, 0 of them not closed, 5 bytes of records that were cut short" in capsys.readouterr().out
+
+
 def test_an_epoch_under_way_is_not_complete(tmp_path, tiny, capsys):
     record(tmp_path / "ledger", tiny.folder, [(0, 0, 3), (1, 0, 1)])
     audit(tmp_path / "ledger")
@@ -109,7 +129,7 @@ def test_a_run_of_which_no_step_counts_proves_nothing(tmp_path, tiny):
 
 def test_it_says_which_steps_saw_a_clip(resumed, tiny, capsys):
     sources = open_sources([SourceConfig(release=str(tiny.folder), split="")])
-    key = sources.key(int(sources.plan(ORDER, 0).rows(1, 1, 2)[0][0]))  # of step 1, which was trained again
+    [key] = sources.keys(sources.plan(ORDER, 0).rows(1, 1, 2)[0])  # of step 1, which was trained again
     audit(resumed, releases=[str(tiny.folder)], clip=key)
     rows = [line.split() for line in capsys.readouterr().out.splitlines()[1:]]
     assert [row[:4] for row in rows if row[0] == "0"] == [["0", "1", "1", "2"], ["0", "1", "0", "1"]]
@@ -120,7 +140,7 @@ def test_it_says_which_steps_saw_a_clip(resumed, tiny, capsys):
 def test_a_clip_that_was_not_delivered_is_said(tmp_path, tiny, capsys):
     sources = record(tmp_path / "ledger", tiny.folder, [(0, 0, 1)])
     seen = np.concatenate(sources.plan(ORDER, 0).rows(0, 0, 1)).tolist()
-    unseen = sources.key(next(ref for ref in range(sources.clips) if ref not in seen))
+    unseen = sources.keys([ref for ref in range(sources.clips) if ref not in seen])[0]
     audit(tmp_path / "ledger", releases=[str(tiny.folder)], clip=unseen)
     assert capsys.readouterr().out == f"{unseen} was not delivered at any recorded step\n"
 
@@ -130,7 +150,8 @@ def test_it_says_what_a_step_brought(resumed, tiny, capsys, named):
     audit(resumed, releases=[str(tiny.folder)] if named else [], epoch=1, step=2)
     sources = open_sources([SourceConfig(release=str(tiny.folder), split="")])
     refs = np.concatenate(sources.plan(ORDER, 1).rows(2, 0, 1)).tolist()
-    expected = [["0", str(ref), *([sources.key(ref)] if named else [])] for ref in refs]
+    keys = sources.keys(refs)
+    expected = [["0", str(ref), *([key] if named else [])] for ref, key in zip(refs, keys, strict=True)]
     assert [line.split() for line in capsys.readouterr().out.splitlines()[1:]] == expected
 
 

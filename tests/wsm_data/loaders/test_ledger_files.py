@@ -76,16 +76,36 @@ def found_in(path):
 
 def test_no_changed_byte_is_taken_for_what_was_written(path):
     data, whole = path.read_bytes(), found_in(path)
-    refused = 0
     for place in range(len(data)):
         path.write_bytes(data[:place] + bytes([data[place] ^ 0x41]) + data[place + 1 :])
         found = found_in(path)
         if isinstance(found, str):
-            refused += str(path) in found
-        else:  # a size that was changed looks like a record that was cut: what comes before it stands
-            assert found == whole[: len(found)]
-            assert len(found) < len(whole) or place >= len(data) - 16
-    assert refused > 0.9 * len(data)
+            assert str(path) in found
+        else:  # the size of the last record, DONE: it looks like one that was cut short
+            assert found == whole
+            assert len(data) - 12 <= place < len(data) - 8
+
+
+@pytest.mark.parametrize("size", [41, 200, 5000, 1 << 28, (1 << 32) - 1])
+@pytest.mark.parametrize("tag", [b"SESS", b"STRT", b"STEP"])
+def test_a_size_that_reaches_past_the_end_does_not_hide_the_records_behind_it(path, tag, size):
+    data = path.read_bytes()
+    place = data.index(tag) + len(tag)
+    path.write_bytes(data[:place] + struct.pack("<I", size) + data[place + 4 :])
+    with pytest.raises(IntegrityError, match=f"at byte {place - 4} must have the size and the checksum"):
+        read_ledger_file(path)
+    if tag == b"SESS":
+        with pytest.raises(IntegrityError, match="at byte 0 must have the size"):
+            read_session(path)
+
+
+def test_the_size_of_the_last_record_alone_can_make_it_look_cut_short(path):
+    data = path.read_bytes()[:-16]  # without DONE, the last step is the last record
+    place = data.rindex(b"STEP") + 4
+    path.write_bytes(data[:place] + struct.pack("<I", 5000) + data[place + 4 :])
+    file = read_ledger_file(path)
+    assert [len(segment.refs) for segment in file.segments] == [4, 1]
+    assert file.torn_bytes == len(data) - place + 4
 
 
 def test_steps_that_were_swapped_are_refused(path):

@@ -124,7 +124,6 @@ def test_a_rank_that_was_killed_before_its_head_was_whole_is_passed_over(tmp_pat
         ([(2, (0, 0), (0, 3)), (2, (1, 0), (1, 6))], "epoch 0: steps 3 to 5 in no session"),
         ([(2, (0, 0), (0, 6)), (2, (1, 2), (1, 6))], "epoch 1: it was begun at step 2 after epoch 0"),
         ([(2, (0, 0), (0, 6)), (2, (2, 0), (2, 6))], "epoch 2: it was begun at step 0 after epoch 0"),
-        ([(2, (0, 2), (0, 6))], "epoch 0: the steps before 2 are not in the ledger"),
         ([(2, (0, 0), [(0, 4), (0, 3)]), (2, (0, 4), (0, 6))], "but rank 1 stops before 3"),
         ([(2, (0, 0), (0, 3)), (2, (0, 5), (0, 5))], "epoch 0: steps 3 to 4 in no session"),
     ],
@@ -132,6 +131,26 @@ def test_a_rank_that_was_killed_before_its_head_was_whole_is_passed_over(tmp_pat
 def test_what_breaks_the_course_is_said(tmp_path, sessions, message):
     for world_size, start, ends in sessions:
         run_session(tmp_path, world_size, start, ends)
+    assert [misfit for misfit in read_timeline(tmp_path).misfits if message in misfit]
+
+
+@pytest.mark.parametrize("start", [(0, 2), (3, 0), (3, 5)])
+def test_a_ledger_may_begin_in_mid_run(tmp_path, start):
+    run_session(tmp_path, 2, start, (4, 1))
+    timeline = read_timeline(tmp_path)
+    assert (timeline.epochs[0].epoch, timeline.epochs[0].start) == start
+    assert timeline.misfits == ()
+    assert min(delivered(timeline)) == start
+
+
+@pytest.mark.parametrize(("rank", "number"), [(0, 0), (0, 1), (1, 0)])
+def test_a_file_that_was_taken_away_is_missed(tmp_path, rank, number):
+    for start in (0, 2, 4):
+        run_session(tmp_path, 2, (0, start), (0, start + 2))
+    (tmp_path / f"rank-{rank:05d}-{number:06d}.ledger").unlink()
+    message = (
+        f"rank-{rank:05d}-{number:06d}.ledger must be in the ledger, as rank-{rank:05d}-{number + 1:06d}.ledger is"
+    )
     assert [misfit for misfit in read_timeline(tmp_path).misfits if message in misfit]
 
 
