@@ -6,14 +6,12 @@ has the clips in the order of the index.
 
 import logging
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.compute as pc
 
 from wsm_data.errors import ConfigError
 from wsm_data.files.digest import sha256_bytes
@@ -26,6 +24,9 @@ from wsm_data.shards.release import Release, open_release
 from wsm_data.shards.selection import read_selection
 
 _LOG = logging.getLogger(__name__)
+
+_COMPARED_AT_ONCE = 1 << 20
+"""Clips of two sources whose texts are held at the same time, to be compared."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -155,10 +156,6 @@ class Sources:
         table = self.tables[bisect_right(self._bases, ref) - 1]
         return table, int(ref) - table.base
 
-    def key(self, ref: int) -> str:
-        """Key of a clip."""
-        return self.keys([ref])[0]
-
     def keys(self, refs: Sequence[int] | Int64Array) -> list[str]:
         """Keys of clips, in the order of the refs."""
         wanted = np.asarray(refs, np.int64)
@@ -252,19 +249,44 @@ def count_duplicates(tables: Sequence[SourceTable]) -> int:
 
 
 def _shared(one: SourceTable, other: SourceTable) -> tuple[int, str]:
-    """How many clips two sources share, and the key of the first."""
+    """How many clips two sources share, and the key of the first in the order of `one`.
+
+    Hashes are compared first, so that of sources of any size only the texts of few clips are held.
+    """
     if one.release.digest == other.release.digest:
         rows = np.intersect1d(one.rows, other.rows, assume_unique=True)
         return len(rows), one.release.index.values(["key"], rows[:1])[0][0] if len(rows) else ""
-    own, others = _content(one), _content(other)
-    shared = own.filter(pc.is_in(own, value_set=others))
-    return len(shared), shared[0].as_py().partition(" ")[0] if len(shared) else ""
+    hashes, others = _content_hashes(one), _content_hashes(other)
+    common = np.intersect1d(hashes, others)
+    count, first = 0, len(one)
+    for start in range(0, len(common), _COMPARED_AT_ONCE):
+        wanted = common[start : start + _COMPARED_AT_ONCE]
+        known = set(_contents(other, _numbers_of(others, wanted)))
+        numbers = _numbers_of(hashes, wanted)
+        shared = [n for n, content in zip(numbers.tolist(), _contents(one, numbers), strict=True) if content in known]
+        count, first = count + len(shared), min([first, *shared[:1]])
+    return count, one.keys([first])[0] if count else ""
 
 
-def _content(table: SourceTable) -> pa.StringArray:
-    """Key, which has no space, and digest of the content of each clip, as one text."""
-    columns = table.release.index.columns(["key", "source_digest"]).take(pa.array(table.rows)).combine_chunks()
-    return pc.binary_join_element_wise(*(column.combine_chunks() for column in columns.columns), " ")
+def _content_hashes(table: SourceTable) -> Int64Array:
+    """A number for each clip, the same for the same content within this process; int64 [clips]."""
+    return np.fromiter(map(hash, _contents(table, np.arange(len(table)))), np.int64, len(table))
+
+
+def _numbers_of(hashes: Int64Array, wanted: Int64Array) -> Int64Array:
+    """Numbers of the clips, ascending, whose hash is one of `wanted`, which are ascending too."""
+    near = np.flatnonzero((hashes >= wanted[0]) & (hashes <= wanted[-1]))
+    return near[np.isin(hashes[near], wanted)]
+
+
+def _contents(table: SourceTable, numbers: Int64Array) -> Iterator[tuple[str, str]]:
+    """Key and digest of the content of some clips, ascending by number; the index is read part by part."""
+    rows, index, start = table.rows[numbers], table.release.index, 0
+    for keys, digests in zip(index.parts("key"), index.parts("source_digest"), strict=True):
+        first, last = np.searchsorted(rows, (start, start + len(keys)))
+        own = rows[first:last] - start
+        yield from zip(keys.take(own).to_pylist(), digests.take(own).to_pylist(), strict=True)
+        start += len(keys)
 
 
 def _words(table: SourceTable) -> str:

@@ -88,12 +88,15 @@ class IndexTable:
         """An integer column as an array [rows]."""
         return np.asarray(self.columns([column])[column].to_numpy())
 
+    def parts(self, column: str) -> Iterator[pa.ChunkedArray]:
+        """A column part by part, the same rows in the same part of every column; nothing is kept."""
+        return self.content.parts(column) if isinstance(self.content, IndexFile) else iter([self.content[column]])
+
     def codes(self, column: str) -> tuple[np.ndarray, tuple[str, ...]]:
         """A repeated text column, such as `split`, as numbers into its values: int32 [rows], and the values."""
-        parts = self.content.parts(column) if isinstance(self.content, IndexFile) else [self.content[column]]
         numbers: dict[str, int] = {}
         codes = [np.empty(0, np.int32)]
-        for chunk in (chunk for part in parts for chunk in part.chunks if len(chunk)):
+        for chunk in (chunk for part in self.parts(column) for chunk in part.chunks if len(chunk)):
             values = chunk.dictionary.to_pylist()
             renumbered = np.array([numbers.setdefault(value, len(numbers)) for value in values], np.int32)
             codes.append(renumbered[chunk.indices.to_numpy()])

@@ -12,7 +12,7 @@ import pytest
 
 from wsm_data.errors import ConfigError
 from wsm_data.loaders.config import OrderConfig, SourceConfig
-from wsm_data.loaders.source_table import open_sources
+from wsm_data.loaders.source_table import _contents, open_sources
 from wsm_data.schema.clip import Clip
 from wsm_data.shards.manifest import manifest_bytes
 from wsm_data.shards.release import open_release
@@ -57,8 +57,8 @@ def test_refs_count_over_all_sources(config: SourceConfig) -> None:
     assert [(sources.tables.index(table), number) for table, number in found] == [
         (source, number) for source, clips in enumerate((5, 2, 7)) for number in range(clips)
     ]
-    assert [sources.key(ref) for ref in range(14)] == [table.keys([number])[0] for table, number in found]
-    assert sources.keys(np.array([13, 0, 6])) == [sources.key(13), sources.key(0), sources.key(6)]
+    assert sources.keys(range(14)) == [table.keys([number])[0] for table, number in found]
+    assert sources.keys(np.array([13, 0, 6])) == [sources.keys([ref])[0] for ref in (13, 0, 6)]
     for ref in (-1, 14):
         with pytest.raises(ValueError, match=f"below 14, found {ref}"):
             sources.locate(ref)
@@ -85,8 +85,8 @@ def test_the_layout_counts_the_clips_of_each_shard(config: SourceConfig, tiny: S
 
 def test_a_selection_leaves_the_clips_that_it_lists(config: SourceConfig, tiny: SimpleNamespace) -> None:
     every = open_sources([config])
-    wanted = [every.key(4), every.key(1)]
-    test_key = open_sources([replace(config, split="test")]).key(0)
+    wanted = every.keys([4, 1])
+    test_key = open_sources([replace(config, split="test")]).keys([0])[0]
     select(tiny.folder, [*wanted, test_key])
     sources = open_sources([replace(config, selection="hard")])
     assert sources.keys(range(sources.clips)) == sorted(wanted, key=lambda key: wanted[::-1].index(key))
@@ -146,6 +146,31 @@ def test_the_same_clip_in_two_releases_is_announced(
     tiny.pack(other, [first, second, changed], shard_bytes=200_000)
     assert open_sources([config, SourceConfig(release=str(other))]).duplicates == 2
     assert first.meta.key in caplog.text or second.meta.key in caplog.text
+
+
+@pytest.mark.parametrize("at_once", [1, 2, 1 << 20])
+@pytest.mark.parametrize("hashes", [1, 2, 1 << 62], ids=["all collide", "many collide", "none collides"])
+def test_clips_are_the_same_by_key_and_content_whatever_their_hashes(
+    tiny: SimpleNamespace,
+    make_clip: Callable[..., Clip],
+    caplog: pytest.LogCaptureFixture,
+    monkeypatch: pytest.MonkeyPatch,
+    at_once: int,
+    hashes: int,
+) -> None:
+    monkeypatch.setattr("wsm_data.loaders.source_table._COMPARED_AT_ONCE", at_once)
+    monkeypatch.setattr(
+        "wsm_data.loaders.source_table._content_hashes",
+        lambda table: np.array([hash(one) % hashes for one in _contents(table, np.arange(len(table)))], np.int64),
+    )
+    changed = [make_clip(clip.meta.id.text, latents=3, source_digest="another") for clip in tiny.clips[4:6]]
+    tiny.pack(tiny.folder.with_name("other"), [*tiny.clips[1:4], *changed], shard_bytes=200_000)
+    configs = [SourceConfig(release=str(folder), split="") for folder in (tiny.folder, tiny.folder.with_name("other"))]
+    first, second = (open_release(config.release).index.columns(["key", "source_digest"]) for config in configs)
+    shared = [row["key"] for row in first.to_pylist() if row in second.to_pylist()]
+    assert len(shared) == 3
+    assert open_sources(configs).duplicates == 3
+    assert f"3 clips, such as {shared[0]}, come from" in caplog.text
 
 
 def test_sources_of_other_codecs_or_image_sizes_are_not_mixed(config: SourceConfig, tiny: SimpleNamespace) -> None:

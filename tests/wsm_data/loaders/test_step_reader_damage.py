@@ -48,7 +48,7 @@ def _read_all(folder: Path, **settings: object) -> dict[str, str]:
         try:
             reader.read(plan, step)
         except IntegrityError as error:
-            refused[sources.key(int(plan.rows(step, 0, 1)[0][0]))] = str(error)
+            refused[sources.keys(plan.rows(step, 0, 1)[0])[0]] = str(error)
     reader.close()
     return refused
 
