@@ -303,10 +303,11 @@ def bench_loader(
     step_ms: Annotated[
         float, typer.Option("--step-ms", min=0, help="Time a training step takes, ms; 0: take batches as they come.")
     ] = 0.0,
+    ranks: Annotated[int, typer.Option("--ranks", min=1, help="Ranks of the run; rank 0 is measured here, alone.")] = 1,
     sweep: Annotated[bool, typer.Option("--sweep", help="Compare 1, 2 and 4 threads too.")] = False,
 ) -> None:
     """The loader doctor: run the real loader, say what holds it up and what to change."""
-    _load("bench").bench_loader(release, assignments or [], batches, seconds, step_ms / 1000, sweep)
+    _load("bench").bench_loader(release, assignments or [], batches, seconds, step_ms / 1000, ranks, sweep)
 
 
 if __name__ == "__main__":

@@ -32,7 +32,7 @@ class _Settings:
 
 
 def bench_loader(
-    release: str, assignments: Sequence[str], batches: int, seconds: float, step_s: float, sweep: bool
+    release: str, assignments: Sequence[str], batches: int, seconds: float, step_s: float, ranks: int, sweep: bool
 ) -> None:
     """Print what a loader of a release does, where its time goes, and what to do about it.
 
@@ -42,6 +42,7 @@ def bench_loader(
         batches: batches to take at most.
         seconds: when to stop, s.
         step_s: time that a training step takes, s; 0 takes batches as fast as they come.
+        ranks: ranks of the training run; the loader of rank 0 is measured.
         sweep: compare some numbers of threads too.
 
     Raises:
@@ -50,22 +51,22 @@ def bench_loader(
     values = merge({"source": {"release": release}}, parse_assignments(assignments))
     settings = build_config(_Settings, values)
     config = LoaderConfig(sources=(settings.source,), order=settings.order, read=settings.read)
-    run, facts = examine(config, batches=batches, seconds=seconds, step_s=step_s)
-    typer.echo(describe(run, config.read))
+    run, facts = examine(config, batches=batches, seconds=seconds, step_s=step_s, ranks=ranks)
+    typer.echo(describe(run, config.read, ranks))
     typer.echo(f"\n{diagnose(run, config.read)}")
     for caution in cautions(facts, config.order):
         typer.echo(f"warning: {caution}")
     if sweep:
-        typer.echo(f"\n{_sweep(config, batches, seconds)}")
+        typer.echo(f"\n{_sweep(config, batches, seconds, ranks)}")
 
 
-def describe(run: LoaderRun, read: ReadConfig) -> str:
+def describe(run: LoaderRun, read: ReadConfig, ranks: int) -> str:
     """The table of a run: rates, and where the time went."""
     kind = "processes" if read.workers else "threads"
     limit = "one stream from the store" if run.remote else "one thread into one buffer"
     rates = aligned(
         [
-            ["measured", "", ""],
+            ["measured" if ranks == 1 else f"measured on rank 0 of {ranks}", "", ""],
             ["samples", f"{run.clips / run.elapsed_s:,.1f}", f"clips/s, {run.clips} in {run.elapsed_s:.1f} s"],
             ["bytes", f"{run.bytes_per_s / 1e6:,.0f}", "MB/s as stored"],
             ["limit", f"{run.limit_bytes_per_s / 1e6:,.0f}", f"MB/s, {limit}, the same clips"],
@@ -81,12 +82,12 @@ def describe(run: LoaderRun, read: ReadConfig) -> str:
     return f"{rates}\n\n{aligned(rows, right=[1, 2])}"
 
 
-def _sweep(config: LoaderConfig, batches: int, seconds: float) -> str:
+def _sweep(config: LoaderConfig, batches: int, seconds: float, ranks: int) -> str:
     """The same with other numbers of threads, one after the other."""
     rows = [["threads", "clips/s", "MB/s", "first batch, ms"]]
     for threads in SWEPT_THREADS:
         read = replace(config.read, threads=threads, workers=0)
-        run, _ = examine(replace(config, read=read), batches=batches, seconds=seconds)
+        run, _ = examine(replace(config, read=read), batches=batches, seconds=seconds, ranks=ranks)
         rows.append(
             [
                 str(threads),

@@ -4,6 +4,7 @@ Order and batches decide what a training run sees, so they are part of the state
 are read (threads, workers, caches) never changes what is delivered.
 """
 
+import math
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -62,8 +63,11 @@ class SourceConfig:
     weight: float = 1.0
 
     def __post_init__(self) -> None:
-        if not self.weight > 0:
-            raise ValueError(f"weight must be above 0, found {self.weight}; leave the source out instead")
+        object.__setattr__(self, "weight", float(self.weight))  # numpy's floats are not spelled as decimals
+        if not 0 < self.weight < math.inf:
+            raise ValueError(
+                f"weight must be finite and above 0, found {self.weight}; to use none, leave the source out"
+            )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,7 +75,7 @@ class OrderConfig:
     """Which clips make up which global step: with the releases, a pure function of seed and epoch.
 
     Attributes:
-        seed: of the order, and of the chunk sizes.
+        seed: of the order, and of the chunk sizes; 0 to 2^64 - 1.
         shuffle: whether clips are permuted; otherwise they come in the order of the index.
         block_clips: clips of a shard that stay together before the shuffle within a window; 0: the whole shard.
         window_blocks: blocks whose clips are shuffled among one another.
@@ -80,7 +84,8 @@ class OrderConfig:
         max_latents: longest sequence, in latents; longer clips are cut to a prefix. 0: whole clips.
         arrangement: one clip a row (`plain`), rows of similar length in a step (`bucket`), or several clips in rows of
             `row_latents` (`pack`).
-        pool: steps whose rows `bucket` sorts by length, or clips among which `pack` looks for what fits.
+        pool: how far `bucket` and `pack` look ahead, in units of their own. `bucket`: so many global steps, whose rows
+            it sorts by length. `pack`: so many clips, among which it looks for what fits. `plain` has no use for it.
         row_latents: length of a packed row, in latents; only for `pack`.
         chunk_sizes: what the chunk size K is drawn from, once for every sequence.
     """
@@ -106,6 +111,8 @@ class OrderConfig:
         for name in ("seed", "block_clips", "max_latents", "row_latents"):
             if getattr(self, name) < 0:
                 raise ValueError(f"{name} must not be negative, found {getattr(self, name)}")
+        if self.seed >= 1 << 64:
+            raise ValueError(f"seed must be below 2^64, found {self.seed}")
         if (self.arrangement is Arrangement.PACK) != (self.row_latents > 0):
             raise ValueError("row_latents belongs to arrangement = pack, and must be above 0 there")
         if not self.chunk_sizes or min(self.chunk_sizes) < 1:
@@ -117,7 +124,8 @@ class ReadConfig:
     """How the bytes of a batch get into memory; none of this changes what is delivered.
 
     Attributes:
-        verify: when checksums are compared: `first` time a process reads a clip, `always`, or `never`.
+        verify: when checksums are compared: `first` time a process reads a clip, `always`, or `never`. Worker processes
+            are started anew for each epoch, and check each clip again in it.
         threads: threads that read ahead in the training process; 0: everything in the caller's thread.
         workers: worker processes in place of threads; every batch is copied between processes then.
         prefetch_batches: batches that are read ahead.

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from wsm_data.files.fsspec_store import FsspecStore
 from wsm_data.files.stores import LocalStore
 from wsm_data.loaders.batch import LATENT_TENSORS, POSE_SLOTS, Batch
 from wsm_data.loaders.clip_places import ClipPlace, clip_places, span_of
@@ -24,7 +25,7 @@ LIMIT_BYTES, LIMIT_S = 1 << 29, 2.0
 
 
 def examine(
-    config: LoaderConfig, *, batches: int, seconds: float, step_s: float = 0.0
+    config: LoaderConfig, *, batches: int, seconds: float, step_s: float = 0.0, ranks: int = 1
 ) -> tuple[LoaderRun, SourceFacts]:
     """Run a loader until it has delivered so many batches or so much time has passed, epoch after epoch.
 
@@ -35,14 +36,15 @@ def examine(
         batches: batches to take behind the first one, at most.
         seconds: when to stop, s.
         step_s: time to rest after each batch, as a training step would take, s.
+        ranks: number of ranks of the training run; what rank 0 of them does is measured.
 
     Raises:
-        ConfigError: the settings are wrong.
+        ConfigError: the settings are wrong, or the ranks cannot share a step.
         IntegrityError: the release is damaged.
         StoreError: a store failed for good.
     """
     start = time.perf_counter()
-    with ClipLoader(replace(config, ledger=""), rank=0, world_size=1) as loader:
+    with ClipLoader(replace(config, ledger=""), rank=0, world_size=ranks) as loader:
         stream = _endless(loader)
         refs = [next(stream).refs.cpu().numpy()]
         first_batch_s = time.perf_counter() - start
@@ -106,22 +108,25 @@ def _stored_bytes(batch: Batch) -> int:
 
 def _read_rate(sources: Sources, places: Sequence[ClipPlace], read: ReadConfig) -> float:
     """Bytes per second at which clips are read again, one after the other into one buffer: one stream, one thread."""
-    stores = [
-        open_remote_store(table.release.store.root, read) if _is_remote(table) else None for table in sources.tables
-    ]
     spans = [(place.source, span_of(place)) for place in places]
     buffer = memoryview(bytearray(max(span.size for _, span in spans)))
-    total, start = 0, time.perf_counter()
     with ExitStack() as opened:
-        files = [LocalShards(table.release.store.root) for table in sources.tables]
-        for file in files:
-            opened.callback(file.close)
+        shards = [_open_shards(table, read) for table in sources.tables]
+        for one in shards:
+            opened.callback(one.close)
+        total, start = 0, time.perf_counter()
         for source, span in spans:
-            if (store := stores[source]) is None:
-                files[source].read_into(span.shard, span.offset, [buffer[: span.size]])
+            one = shards[source]
+            if isinstance(one, LocalShards):
+                one.read_into(span.shard, span.offset, [buffer[: span.size]])
             else:
-                read_exactly(store, span)
+                read_exactly(one, span)
             total += span.size
             if total > LIMIT_BYTES or time.perf_counter() - start > LIMIT_S:
                 break
-    return total / (time.perf_counter() - start)
+        return total / (time.perf_counter() - start)
+
+
+def _open_shards(table: SourceTable, read: ReadConfig) -> LocalShards | FsspecStore:
+    root = table.release.store.root
+    return open_remote_store(root, read) if _is_remote(table) else LocalShards(root)

@@ -32,6 +32,12 @@ def test_settings_are_those_of_the_loader(bench):
     assert "time of 1 caller" in done.stdout
 
 
+def test_rank_0_of_some_ranks_is_measured(bench):
+    done = bench(*SMALL, "--ranks", "2")
+    assert "measured on rank 0 of 2" in done.stdout
+    assert "2 in" in done.stdout  # two batches of its one row
+
+
 def test_a_sweep_compares_numbers_of_threads(bench):
     done = bench(*SMALL, "--sweep")
     rows = [line.split() for line in done.stdout.splitlines()]
@@ -44,7 +50,7 @@ def test_a_sweep_compares_numbers_of_threads(bench):
     [
         (["--set", "read.thread=2"], "unknown key read.thread; did you mean read.threads?"),
         (["--set", "order.global_batch=0"], "global_batch must be at least 1"),
-        (["--set", "source.weight=-1"], "weight must be above 0"),
+        (["--set", "source.weight=-1"], "weight must be finite and above 0"),
     ],
 )
 def test_wrong_settings_are_refused_before_anything_is_read(bench, words, said, capsys):

@@ -1,15 +1,34 @@
 """Settings of a loader: what makes no sense is refused where it is written."""
 
+import math
+
+import numpy as np
 import pytest
 
 from wsm_data.files.retries import RequestConfig
 from wsm_data.loaders.config import Arrangement, LoaderConfig, OrderConfig, ReadConfig, SourceConfig
+from wsm_data.loaders.mixing import stretch_of_epoch
+from wsm_data.loaders.stable_hash import mix64
 
 
-@pytest.mark.parametrize("weight", [0.0, -1.0, float("nan")])
-def test_a_source_has_a_weight_above_0(weight):
+@pytest.mark.parametrize("weight", [0.0, -1.0, math.nan, math.inf, np.float64(math.inf)])
+def test_a_source_has_a_finite_weight_above_0(weight):
     with pytest.raises(ValueError, match="leave the source out"):
         SourceConfig(release="release", weight=weight)
+
+
+@pytest.mark.parametrize("weight", [np.float64(0.25), np.float32(0.25), 0.25])
+def test_weights_of_numpy_are_those_of_python(weight):
+    source = SourceConfig(release="release", weight=weight)
+    assert repr(source.weight) == "0.25"
+    assert stretch_of_epoch(10, source.weight, 1) == (2, 5)
+
+
+def test_a_seed_is_a_word_of_64_bits():
+    largest = OrderConfig(seed=(1 << 64) - 1)
+    assert mix64(np.arange(3), largest.seed).tolist() != mix64(np.arange(3), 0).tolist()
+    with pytest.raises(ValueError, match=r"seed must be below 2\^64, found 18446744073709551616"):
+        OrderConfig(seed=1 << 64)
 
 
 @pytest.mark.parametrize("name", ["window_blocks", "global_batch", "pool"])

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from wsm_data.errors import IntegrityError
+from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.loaders.clip_places import clip_places
 from wsm_data.loaders.config import LoaderConfig, OrderConfig, ReadConfig, Remainder, SourceConfig
 from wsm_data.loaders.diagnosis import cautions, diagnose
 from wsm_data.loaders.doctor import examine, source_facts
+from wsm_data.loaders.remote import open_remote_store
 from wsm_data.loaders.timing import Part
 
 BATCH = 2
@@ -59,6 +60,26 @@ def test_a_training_step_takes_its_time(released):
     run, _ = examine(config(released.folder), batches=4, seconds=30.0, step_s=0.02)
     assert run.step_s == 0.02
     assert run.elapsed_s >= 4 * 0.02
+
+
+def test_rank_0_of_several_has_its_share_of_each_step(released):
+    run, facts = examine(config(released.folder), batches=3, seconds=30.0, ranks=BATCH)
+    assert run.clips == 3
+    assert facts == examine(config(released.folder), batches=1, seconds=30.0)[1]
+    with pytest.raises(ConfigError, match="global_batch"):
+        examine(config(released.folder), batches=3, seconds=30.0, ranks=BATCH + 1)
+
+
+def test_connections_of_the_measured_limit_are_closed(remote, monkeypatch):
+    opened = []
+
+    def noted(*arguments):
+        opened.append(open_remote_store(*arguments))
+        return opened[-1]
+
+    monkeypatch.setattr("wsm_data.loaders.doctor.open_remote_store", noted)
+    look(remote.url, batches=1, seconds=20.0)
+    assert [store._closed.is_set() for store in opened] == [True]
 
 
 def test_its_diagnosis_is_a_sentence_about_the_run(released):
