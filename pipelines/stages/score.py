@@ -15,15 +15,15 @@ import pyarrow as pa
 from pipelines.stage import Finished, Outcome, Settled, Stage, StageContext, Unit
 from wsm_data.codecs.base import VideoCodec
 from wsm_data.codecs.dct import DctCodec
+from wsm_data.curation.path_outline import Outlines
 from wsm_data.curation.rollouts import ROLLOUT_SCORES, read_rollouts, rollout_scores
-from wsm_data.curation.score_clip import CLIP_SCORES, score_clip
-from wsm_data.curation.scores_table import ScoreTable, read_paths, read_scores, write_scores
+from wsm_data.curation.score_clip import CLIP_SCORES, ClipScores, score_clip
+from wsm_data.curation.scores_table import SCORES_VERSION, ScoreTable, read_paths, read_scores, write_scores
 from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.files.atomic import write_bytes
 from wsm_data.files.digest import digest_json, sha256_file
 from wsm_data.files.stores import open_store
 from wsm_data.files.typed_toml import INPUT, SELECTION
-from wsm_data.schema.arrays import Float32Array
 from wsm_data.shards.manifest import release_digest
 from wsm_data.shards.names import SCORES_NAME
 from wsm_data.shards.release import Release, open_release, read_manifest
@@ -60,7 +60,7 @@ def _list_units(config: ScoreConfig) -> Sequence[Unit]:
     shared = {
         "codec": manifest.codec.digest,
         "rgb_std": digest_json(list(manifest.rgb_statistics.std)),
-        "scores": digest_json([asdict(one) for one in CLIP_SCORES]),
+        "scores": digest_json([SCORES_VERSION, *(asdict(one) for one in CLIP_SCORES)]),
     }
     return [Unit(id=shard.name, inputs={"shard": shard.sha256, **shared}) for shard in manifest.shards]
 
@@ -79,9 +79,16 @@ def _process(batch: Sequence[Unit], config: ScoreConfig, context: StageContext) 
             release_digest=unit.inputs["shard"], scorers=CLIP_SCORES, keys=pa.array(keys, pa.string()), columns=columns
         )
         path = _part_path(context.out, unit.id)
-        write_scores(path, table, np.array([clip.outline_xy_m for clip in found], np.float32))
+        write_scores(path, table, _outlines(found))
         outputs = (str(path.relative_to(context.out)),)
         yield Outcome(unit=unit.id, digest=sha256_file(path), outputs=outputs, facts={"clips": len(keys)})
+
+
+def _outlines(clips: Sequence[ClipScores]) -> Outlines:
+    return Outlines(
+        xy_m=np.array([clip.outline_xy_m for clip in clips], np.float32),
+        floor_z_m=np.array([clip.floor_z_m for clip in clips], np.float32),
+    )
 
 
 @lru_cache(maxsize=1)
@@ -97,12 +104,12 @@ def _finish(config: ScoreConfig, context: StageContext, settled: Settled) -> Fin
         return Finished()
     release = open_release(config.release)
     path = context.out / SCORES_NAME
-    table, paths_xy_m = _merged(context.out, release)
-    write_scores(path, _with_rollouts(table, config, release), paths_xy_m)
+    table, outlines = _merged(context.out, release)
+    write_scores(path, _with_rollouts(table, config, release), outlines)
     return Finished(outputs=(SCORES_NAME, *_installed(path, config, context.out)))
 
 
-def _merged(out: Path, release: Release) -> tuple[ScoreTable, Float32Array]:
+def _merged(out: Path, release: Release) -> tuple[ScoreTable, Outlines]:
     """The scores and outlines of all clips, in the order of the index."""
     parts, outlines = [], []
     for shard in release.manifest.shards:
@@ -123,7 +130,11 @@ def _merged(out: Path, release: Release) -> tuple[ScoreTable, Float32Array]:
         keys=keys.take(pa.array(order)),
         columns=columns,
     )
-    return table, np.concatenate(outlines)[order]
+    paths = Outlines(
+        xy_m=np.concatenate([one.xy_m for one in outlines]),
+        floor_z_m=np.concatenate([one.floor_z_m for one in outlines]),
+    )
+    return table, paths.take(order)
 
 
 def _with_rollouts(table: ScoreTable, config: ScoreConfig, release: Release) -> ScoreTable:
@@ -175,7 +186,7 @@ def _part_path(out: Path, shard: str) -> Path:
 
 STAGE = Stage(
     name="score",
-    version=1,
+    version=2,
     config_type=ScoreConfig,
     list_units=_list_units,
     process=_process,

@@ -12,13 +12,14 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from wsm_data.curation.diversity import paths_are_near
+from wsm_data.curation.diversity import SAME_FLOOR_M, paths_are_near
+from wsm_data.curation.path_outline import Outlines
 from wsm_data.curation.quotas import QuotaTable
 from wsm_data.errors import ConfigError
 from wsm_data.schema.arrays import BoolArray, Float32Array
 
-PathReader = Callable[[NDArray[np.int64]], Float32Array]
-"""From numbers of candidates [M] to the outlines of their paths, world, m; float32 [M, P, 2]."""
+PathReader = Callable[[NDArray[np.int64]], Outlines]
+"""From numbers of clips, int64 [M], to the outlines of their paths."""
 
 _LEAST_BLOCK = 1 << 16
 _CHOSEN, _NEAR, _FULL = 0, 1, 2
@@ -31,7 +32,8 @@ class Chosen:
 
     Attributes:
         places: chosen clips by their place in the walk, ascending: hardest first; int64 [n].
-        near_duplicates: clips left out for a harder one whose path is nearly the same.
+        near_duplicates: clips left out for one that was taken before them and whose path is nearly the same: a harder
+            one, or one that a quota asked for.
         over_quota: clips left out because a quota was full.
     """
 
@@ -49,6 +51,7 @@ class _State:
         is_chosen: of each candidate; bool [N].
         stored: candidates by the order in which they were taken; int64 [count].
         paths: outlines of the taken clips; float32 [count, P, 2].
+        floors_m: heights of their floors; float32 [count].
         heads: first clip of each chain, as a number in `stored`; int64 [power of two].
         following: next clip of the same chain; int64 [count].
         totals: taken, near-duplicates, over quota; int64 [3].
@@ -58,6 +61,7 @@ class _State:
     is_chosen: BoolArray
     stored: NDArray[np.int64]
     paths: Float32Array
+    floors_m: Float32Array
     heads: NDArray[np.int64]
     following: NDArray[np.int64]
     totals: NDArray[np.int64]
@@ -83,6 +87,7 @@ def choose_clips(
         is_chosen=np.zeros(len(scenes), bool),
         stored=np.zeros(count, np.int64),
         paths=np.zeros((count, 0, 2), np.float32),
+        floors_m=np.zeros(count, np.float32),
         heads=np.full(1 << max(10, (2 * count).bit_length()), _NO_CLIP, np.int64),
         following=np.full(count, _NO_CLIP, np.int64),
         totals=np.zeros(3, np.int64),
@@ -117,12 +122,13 @@ def _pass(
         first += len(block)
         waiting = (state.taken < quotas.least)[quotas.codes[:, block]].sum(axis=0)
         block = block[(waiting >= wanted_by) & ~state.is_chosen[block]]
-        paths = read_paths(block) if within_m else np.zeros((len(block), 0, 2), np.float32)
-        if state.paths.shape[1] != paths.shape[1]:  # known from the first block on
-            state = _with_room(state, paths.shape[1])
+        paths = read_paths(block) if within_m else _no_outlines(len(block))
+        if state.paths.shape[1] != paths.xy_m.shape[1]:  # known from the first block on
+            state = _with_room(state, paths.xy_m.shape[1])
         _walk(
-            block, paths, scenes, quotas.codes, quotas.least, quotas.most, wanted_by, within_m,
-            state.taken, state.is_chosen, state.stored, state.paths, state.heads, state.following, state.totals,
+            block, paths.xy_m, paths.floor_z_m, scenes, quotas.codes, quotas.least, quotas.most, wanted_by, within_m,
+            state.taken, state.is_chosen, state.stored, state.paths, state.floors_m, state.heads, state.following,
+            state.totals,
         )  # fmt: skip
     return state
 
@@ -131,12 +137,16 @@ def _with_room(state: _State, points: int) -> _State:
     return _State(**{**vars(state), "paths": np.zeros((len(state.stored), points, 2), np.float32)})
 
 
+def _no_outlines(clips: int) -> Outlines:
+    return Outlines(xy_m=np.zeros((clips, 0, 2), np.float32), floor_z_m=np.zeros(clips, np.float32))
+
+
 @numba.njit(cache=True)  # type: ignore[untyped-decorator]
 def _walk(
-    block: NDArray[np.int64], paths: Float32Array, scenes: NDArray[np.int32], codes: NDArray[np.int32],
-    least: NDArray[np.int64], most: NDArray[np.int64], wanted_by: int, within_m: float,
+    block: NDArray[np.int64], paths: Float32Array, floors_m: Float32Array, scenes: NDArray[np.int32],
+    codes: NDArray[np.int32], least: NDArray[np.int64], most: NDArray[np.int64], wanted_by: int, within_m: float,
     taken: NDArray[np.int64], is_chosen: BoolArray, stored: NDArray[np.int64], stored_paths: Float32Array,
-    heads: NDArray[np.int64], following: NDArray[np.int64], totals: NDArray[np.int64],
+    stored_floors_m: Float32Array, heads: NDArray[np.int64], following: NDArray[np.int64], totals: NDArray[np.int64],
 ) -> None:  # fmt: skip
     """Take clips of a block one after the other until there are enough."""
     for number in range(len(block)):
@@ -154,8 +164,9 @@ def _walk(
             totals[_FULL] += wanted_by == 0
             continue
         if within_m > 0 and _is_near(
-            paths[number], scenes[clip], within_m, scenes, stored, stored_paths, heads, following
-        ):
+            paths[number], floors_m[number], scenes[clip], within_m, scenes, stored, stored_paths, stored_floors_m,
+            heads, following,
+        ):  # fmt: skip
             totals[_NEAR] += wanted_by == 0
             continue
         entry = totals[_CHOSEN]
@@ -164,7 +175,7 @@ def _walk(
         for kind in range(len(codes)):
             taken[codes[kind, clip]] += 1
         if within_m > 0:
-            stored_paths[entry] = paths[number]
+            stored_paths[entry], stored_floors_m[entry] = paths[number], floors_m[number]
             chain = _chain(
                 scenes[clip], _cell(paths[number, 0, 0], within_m), _cell(paths[number, 0, 1], within_m), len(heads)
             )
@@ -173,16 +184,21 @@ def _walk(
 
 @numba.njit(cache=True)  # type: ignore[untyped-decorator]
 def _is_near(
-    path: Float32Array, scene: int, within_m: float, scenes: NDArray[np.int32], stored: NDArray[np.int64],
-    stored_paths: Float32Array, heads: NDArray[np.int64], following: NDArray[np.int64],
+    path: Float32Array, floor_m: float, scene: int, within_m: float, scenes: NDArray[np.int32],
+    stored: NDArray[np.int64], stored_paths: Float32Array, stored_floors_m: Float32Array, heads: NDArray[np.int64],
+    following: NDArray[np.int64],
 ) -> bool:  # fmt: skip
-    """Whether a path is near one that was taken in its scene: those that start in its cell or in one beside it."""
+    """Whether a path is near one that was taken on its floor: those that start in its cell or in one beside it."""
     column, row = _cell(path[0, 0], within_m), _cell(path[0, 1], within_m)
     for right in range(-1, 2):
         for down in range(-1, 2):
             entry = heads[_chain(scene, column + right, row + down, len(heads))]
             while entry >= 0:
-                if scenes[stored[entry]] == scene and paths_are_near(path, stored_paths[entry], within_m):
+                same_floor = (
+                    scenes[stored[entry]] == scene
+                    and abs(np.float64(floor_m) - np.float64(stored_floors_m[entry])) <= SAME_FLOOR_M
+                )
+                if same_floor and paths_are_near(path, stored_paths[entry], within_m):
                     return True
                 entry = following[entry]
     return False
@@ -217,7 +233,9 @@ def _require_count(quotas: QuotaTable, state: _State, count: int, within_m: floa
     full = [quotas.names[place] for place in np.flatnonzero(state.taken >= quotas.most)]
     reasons = []
     if near:
-        reasons.append(f"{near} clips are near-duplicates of harder ones (diversity.within_m = {within_m:g})")
+        reasons.append(
+            f"{near} clips are near-duplicates of ones that were taken before (diversity.within_m = {within_m:g})"
+        )
     if over:
         reasons.append(f"{over} are over the quota of {', '.join(full[:5])}{', ...' if len(full) > 5 else ''}")
     if chosen + near + over < count:

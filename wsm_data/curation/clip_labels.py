@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wsm_data.curation.path_outline import path_outline
-from wsm_data.curation.scores_table import PATH_POINTS
+from wsm_data.curation.path_outline import PATH_POINTS, path_outline
 from wsm_data.errors import IntegrityError
 from wsm_data.files.digest import xxh3_64
 from wsm_data.geometry.transform import transforms_from_vectors

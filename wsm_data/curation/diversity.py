@@ -12,15 +12,18 @@ import numpy as np
 
 from wsm_data.schema.arrays import Float32Array
 
+SAME_FLOOR_M = 0.5
+"""Floors of one scene whose heights differ by more are different floors: paths one above the other are two paths."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class DiversityConfig:
     """When two paths count as one.
 
     Attributes:
-        within_m: two paths of one physical scene whose discrete Frechet distance is at most this are near-duplicates,
-            of which the hardest is taken, m; 0 to take all. Paths are compared as 32 evenly spaced points: that moves
-            the distance by half their spacing at most.
+        within_m: two paths on one floor of a physical scene whose discrete Frechet distance is at most this are
+            near-duplicates, of which the first to come is taken: the hardest, but for quotas; m, 0 to take all. Paths
+            are compared as 32 evenly spaced points: that moves the distance by half their spacing at most.
     """
 
     within_m: float = 0.5

@@ -1,8 +1,35 @@
 """A path as a fixed number of points: what near-duplicates are told by, without reading a shard."""
 
-import numpy as np
+from dataclasses import dataclass
 
-from wsm_data.schema.arrays import Float64Array
+import numpy as np
+from numpy.typing import NDArray
+
+from wsm_data.schema.arrays import Float32Array, Float64Array, require_array
+
+PATH_POINTS = 32
+"""Points of a path's outline."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Outlines:
+    """Paths of some clips, and the floors they run on.
+
+    Attributes:
+        xy_m: points evenly spaced along each path, first and last included, world, m; float32 [M, P, 2].
+        floor_z_m: height of the floor below each start, world z, m; float32 [M].
+    """
+
+    xy_m: Float32Array
+    floor_z_m: Float32Array
+
+    def __post_init__(self) -> None:
+        require_array("xy_m", self.xy_m, np.float32, (None, None, 2))
+        require_array("floor_z_m", self.floor_z_m, np.float32, (len(self.xy_m),))
+
+    def take(self, numbers: NDArray[np.int64]) -> "Outlines":
+        """Those of some of the clips, in the order of their numbers; int64 [n]."""
+        return Outlines(xy_m=self.xy_m[numbers], floor_z_m=self.floor_z_m[numbers])
 
 
 def path_outline(path_xy_m: Float64Array, points: int) -> Float64Array:

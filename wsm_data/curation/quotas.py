@@ -20,7 +20,7 @@ _ROUNDING = 1e-9  # 0.3 of 10 clips is 3 clips, whatever 0.3 is in binary
 
 @dataclass(frozen=True, kw_only=True)
 class Limits:
-    """Bounds on a number of chosen clips. Below 1 a share of the selection, from 1 on a number of clips.
+    """Bounds on a number of chosen clips. Below 1 a share of the selection, from 1 on a number: 1.0 is one clip.
 
     Attributes:
         at_least: no fewer than this.
@@ -33,7 +33,7 @@ class Limits:
     def __post_init__(self) -> None:
         for name in ("at_least", "at_most"):
             value = getattr(self, name)
-            if value is not None and (value < 0 or (value >= 1 and value != int(value))):
+            if value is not None and not (0 <= value < 1 or (1 <= value < math.inf and value == int(value))):
                 raise ValueError(f"{name} must be a share below 1 or a whole number of clips, found {value}")
 
 

@@ -51,7 +51,7 @@ ROLLOUT_SCORES: tuple[ScorerInfo, ...] = (
         name="rollout_ate_m",
         unit="m",
         direction=Direction.HIGHER,
-        summary="absolute trajectory error of the SLAM expert, mean over queries",
+        summary="absolute trajectory error (RMSE) of the SLAM expert after Sim(3) alignment, mean over queries",
         absent=_NO_ROLLOUTS,
     ),
     ScorerInfo(

@@ -120,7 +120,7 @@ def rate_clips(scores: ScoreTable, config: RuleConfig, rows: NDArray[np.int64] |
     Raises:
         ConfigError: the rule names a score that is not there or has no hard end, or a clip has none of its scores.
     """
-    infos = [_require_score(scores, name) for name in config.scores]
+    infos = ruling_scores(scores.scorers, config)
     with ThreadPoolExecutor(_SORTS_AT_ONCE) as pool:  # sorting holds no lock, and takes most of the time
         ranked = list(pool.map(lambda one: hardness_percentiles(_column(scores, one.name, rows), one.direction), infos))
     percentiles = dict(zip(config.scores, ranked, strict=True))
@@ -134,11 +134,29 @@ def rate_clips(scores: ScoreTable, config: RuleConfig, rows: NDArray[np.int64] |
         key = scores.keys[place if rows is None else int(rows[place])].as_py()
         raise ConfigError(
             f"{int(unrated.sum())} clips have none of the scores of the rule ({', '.join(config.scores)}), such as "
-            f"{key}; score them, or select by other scores"
+            f"{key}; score them, select by other scores, or leave them out with exclude.unscored=true"
         )
     return Rating(
         difficulty=difficulty, percentiles={name: one.astype(np.float32) for name, one in percentiles.items()}
     )
+
+
+def ruling_scores(scorers: Sequence[ScorerInfo], config: RuleConfig) -> tuple[ScorerInfo, ...]:
+    """The scores that a rule reads, in its order, of those there are.
+
+    Raises:
+        ConfigError: the rule names a score that is not there or has no hard end.
+    """
+    infos = {one.name: one for one in scorers}
+    for name in config.scores:
+        if name not in infos:
+            hint = " (from rollouts: evaluate a policy first)" if name.startswith("rollout_") else ""
+            raise ConfigError(
+                f"the rule needs the score {name!r}{hint}, which is not there; {did_you_mean(name, infos)}"
+            )
+        if infos[name].direction is Direction.NEUTRAL:
+            raise ConfigError(f"the score {name!r} has no hard end, so a rule cannot go by it; take another")
+    return tuple(infos[name] for name in config.scores)
 
 
 def hardness_percentiles(values: Float64Array, direction: Direction) -> Float64Array:
@@ -161,16 +179,6 @@ def hardness_percentiles(values: Float64Array, direction: Direction) -> Float64A
 def _column(scores: ScoreTable, name: str, rows: NDArray[np.int64] | None) -> Float64Array:
     values = scores.columns[name]
     return values if rows is None else values[rows]
-
-
-def _require_score(scores: ScoreTable, name: str) -> ScorerInfo:
-    infos = {one.name: one for one in scores.scorers}
-    if name not in infos:
-        hint = " (from rollouts: evaluate a policy first)" if name.startswith("rollout_") else ""
-        raise ConfigError(f"the rule needs the score {name!r}{hint}, which is not there; {did_you_mean(name, infos)}")
-    if infos[name].direction is Direction.NEUTRAL:
-        raise ConfigError(f"the score {name!r} has no hard end, so a rule cannot go by it; take another")
-    return infos[name]
 
 
 def _weighted_mean(percentiles: Sequence[Float64Array], weights: Sequence[float], emphasis: int) -> Float64Array:

@@ -4,12 +4,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from wsm_data.codecs.base import VideoCodec
-from wsm_data.curation.path_outline import path_outline
+from wsm_data.curation.path_outline import PATH_POINTS, path_outline
 from wsm_data.curation.scorers.clip_images import images_of
 from wsm_data.curation.scorers.registry import GEOMETRY_SCORERS, IMAGE_SCORERS
 from wsm_data.curation.scorers.scorer import require_score
 from wsm_data.curation.scorers.trajectory import Trajectory, trajectory_of
-from wsm_data.curation.scores_table import PATH_POINTS, ScorerInfo
+from wsm_data.curation.scores_table import ScorerInfo
 from wsm_data.schema.arrays import Float64Array
 from wsm_data.schema.clip import Clip
 
@@ -27,10 +27,12 @@ class ClipScores:
     Attributes:
         values: by the name of the score, in the order of `CLIP_SCORES`; NaN where a score is absent.
         outline_xy_m: outline of the path, world, m; float64 [32, 2].
+        floor_z_m: height of the floor below the first camera, world z, m.
     """
 
     values: Mapping[str, float]
     outline_xy_m: Float64Array
+    floor_z_m: float
 
 
 def score_clip(clip: Clip, rgb_std: Float64Array, codec: VideoCodec | None, depth_samples: int) -> ClipScores:
@@ -51,6 +53,7 @@ def score_clip(clip: Clip, rgb_std: Float64Array, codec: VideoCodec | None, dept
     return ClipScores(
         values=score_trajectory(trajectory, clip.meta.key) | of_images,
         outline_xy_m=path_outline(trajectory.path_xy_m, PATH_POINTS),
+        floor_z_m=float(trajectory.T_world_camera[0, 2, 3]) - clip.meta.camera_height_m,
     )
 
 

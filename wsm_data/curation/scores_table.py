@@ -1,9 +1,9 @@
 """scores.parquet: every score of every clip of one release, column by column.
 
-One row per clip, in the order of the release's index: a text column `key`, the outline of the path, and a float64
-column per score. The file's metadata holds, under `wsm.scores`, what each score is and the digest of the release it
-belongs to. An absent value is null in the file and NaN in memory, and is taken only for scores that say what their
-absence means.
+One row per clip, in the order of the release's index: a text column `key`, the outline of the path and the height of
+its floor, and a float64 column per score. The file's metadata holds, under `wsm.scores`, what each score is and the
+digest of the release it belongs to. An absent value is null in the file and NaN in memory, and is taken only for scores
+that say what their absence means.
 """
 
 import json
@@ -21,20 +21,23 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from wsm_data.curation.path_outline import PATH_POINTS, Outlines
 from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.files.atomic import atomic_file
 from wsm_data.files.jsonlines import canonical_json
 from wsm_data.files.typed_toml import did_you_mean
-from wsm_data.schema.arrays import Float32Array, Float64Array, require_array
+from wsm_data.schema.arrays import Float32Array, Float64Array, require_array, require_finite
 
-SCORES_VERSION = 1
-KEY_COLUMN, PATH_COLUMN = "key", "path_xy_m"
-PATH_POINTS = 32
-"""Points of a path's outline."""
+SCORES_VERSION = 2
+KEY_COLUMN, PATH_COLUMN, FLOOR_COLUMN = "key", "path_xy_m", "floor_z_m"
 
 _METADATA_KEY = b"wsm.scores"
+_POINT_DTYPE = np.dtype("<f4")
+_PATH_BYTES = PATH_POINTS * 2 * _POINT_DTYPE.itemsize
+"""An outline is stored as one value of so many bytes: a list of numbers takes several times as long to read."""
+
 _ROW_GROUP_ROWS = 1 << 17
-"""What is read at a time where outlines are asked for: 32 MB of them."""
+"""What is read at a time where outlines are asked for: 34 MB of them."""
 _SHOWN_CLIPS = 3
 
 
@@ -52,7 +55,7 @@ class ScorerInfo:
 
     Attributes:
         name: name of its column.
-        unit: unit of its values, such as `m`, `rad/m`, `share` or `ratio`.
+        unit: unit of its values, such as `m`, `rad per 0.5 m`, `share` or `ratio`.
         direction: which end is hard.
         summary: one line: what is measured.
         version: raised when the same clip gets another value.
@@ -85,7 +88,11 @@ class ScoreTable:
 
     def __post_init__(self) -> None:
         names = [one.name for one in self.scorers]
-        if len(set(names)) != len(names) or {KEY_COLUMN, PATH_COLUMN} & set(names) or names != list(self.columns):
+        if (
+            len(set(names)) != len(names)
+            or {KEY_COLUMN, PATH_COLUMN, FLOOR_COLUMN} & set(names)
+            or names != list(self.columns)
+        ):
             raise ValueError(f"columns must be those of the scorers, once each, {names}, found {list(self.columns)}")
         for name, values in self.columns.items():
             if values.dtype != np.float64 or values.shape != (len(self.keys),):
@@ -97,21 +104,20 @@ class ScoreTable:
         return len(self.keys)
 
 
-def write_scores(path: Path, table: ScoreTable, paths_xy_m: Float32Array) -> None:
+def write_scores(path: Path, table: ScoreTable, outlines: Outlines) -> None:
     """Write a table atomically; equal tables and an equal pyarrow give equal bytes.
 
     Args:
         path: where to.
         table: the scores.
-        paths_xy_m: outlines of the clips' paths (`curation.path_outline`), world, m; float32 [N, 32, 2].
+        outlines: of the clips' paths (`curation.path_outline`), of 32 points.
 
     Raises:
         ConfigError: a value is infinite, or absent where the score says it is always there; names score and clip.
     """
     require_sound_values(table, str(path))
-    require_array("paths_xy_m", paths_xy_m, np.float32, (len(table), PATH_POINTS, 2))
-    paths = pa.FixedSizeListArray.from_arrays(pa.array(paths_xy_m.reshape(-1)), 2 * PATH_POINTS)
-    arrays = [table.keys, paths, *(pa.array(values, from_pandas=True) for values in table.columns.values())]
+    arrays = [table.keys, *_stored_outlines(outlines, len(table))]
+    arrays += [pa.array(values, from_pandas=True) for values in table.columns.values()]
     stored = pa.Table.from_arrays(arrays, schema=_schema(table.release_digest, table.scorers))
     with atomic_file(path) as file:
         pq.write_table(
@@ -170,21 +176,18 @@ def read_scorers(location: str | Path) -> tuple[ScorerInfo, ...]:
         return _parse_metadata(file.schema_arrow)[1]
 
 
-def read_paths(location: str | Path, rows: NDArray[np.int64]) -> Float32Array:
-    """Read the outlines of some clips' paths, in constant memory beside what is returned.
+def read_paths(location: str | Path, rows: NDArray[np.int64]) -> Outlines:
+    """Read the outlines of some clips' paths, of 32 points, in constant memory beside what is returned.
 
     Args:
         location: path or URL of a file of scores.
         rows: numbers of its rows, in any order; int64 [M].
 
-    Returns:
-        Points evenly spaced along each path, first and last included, world, m; float32 [M, 32, 2].
-
     Raises:
         ConfigError: there is no such file.
         IntegrityError: it is damaged, or no table of scores of this version.
     """
-    found = np.empty((len(rows), PATH_POINTS, 2), np.float32)
+    xy_m, floor_z_m = np.empty((len(rows), PATH_POINTS, 2), np.float32), np.empty(len(rows), np.float32)
     first = 0
     with _open(str(location)) as file:
         _parse_metadata(file.schema_arrow)
@@ -192,11 +195,13 @@ def read_paths(location: str | Path, rows: NDArray[np.int64]) -> Float32Array:
             count = file.metadata.row_group(group).num_rows
             inside = np.flatnonzero((rows >= first) & (rows < first + count))
             if len(inside):
-                stored = file.read_row_group(group, [PATH_COLUMN])[PATH_COLUMN].combine_chunks()
-                values = stored.flatten().to_numpy(zero_copy_only=False).reshape(count, PATH_POINTS, 2)
-                found[inside] = values[rows[inside] - first]
+                stored = file.read_row_group(group, [PATH_COLUMN, FLOOR_COLUMN])
+                if stored[PATH_COLUMN].null_count or stored[FLOOR_COLUMN].null_count:
+                    raise ValueError("every clip must have an outline and a floor")
+                xy_m[inside] = _points(stored[PATH_COLUMN])[rows[inside] - first]
+                floor_z_m[inside] = stored[FLOOR_COLUMN].to_numpy()[rows[inside] - first]
             first += count
-    return found
+    return Outlines(xy_m=xy_m, floor_z_m=floor_z_m)
 
 
 def require_sound_values(table: ScoreTable, where: str) -> None:
@@ -223,9 +228,26 @@ def _schema(release_digest: str, scorers: Sequence[ScorerInfo]) -> pa.Schema:
         "release_digest": release_digest,
         "scorers": [asdict(one) for one in scorers],
     }
-    columns = [(KEY_COLUMN, pa.string()), (PATH_COLUMN, pa.list_(pa.float32(), 2 * PATH_POINTS))]
+    columns = [(KEY_COLUMN, pa.string()), (PATH_COLUMN, pa.binary(_PATH_BYTES)), (FLOOR_COLUMN, pa.float32())]
     columns += [(one.name, pa.float64()) for one in scorers]
     return pa.schema(columns, metadata={_METADATA_KEY: canonical_json(record)})
+
+
+def _stored_outlines(outlines: Outlines, clips: int) -> list[pa.Array]:
+    """The columns of paths and floors, none of whose numbers may be missing."""
+    require_array("xy_m", outlines.xy_m, np.float32, (clips, PATH_POINTS, 2))
+    require_finite("xy_m", outlines.xy_m)
+    require_finite("floor_z_m", outlines.floor_z_m)
+    points = pa.py_buffer(np.ascontiguousarray(outlines.xy_m, _POINT_DTYPE))
+    paths = pa.FixedSizeBinaryArray.from_buffers(pa.binary(_PATH_BYTES), clips, [None, points])
+    return [paths, pa.array(outlines.floor_z_m)]
+
+
+def _points(stored: pa.ChunkedArray) -> Float32Array:
+    """The points of stored outlines; float32 [N, 32, 2]."""
+    array = stored.combine_chunks()
+    data = np.frombuffer(array.buffers()[1], _POINT_DTYPE, len(array) * PATH_POINTS * 2, array.offset * _PATH_BYTES)
+    return data.reshape(len(array), PATH_POINTS, 2).astype(np.float32, copy=False)
 
 
 def _load(where: str, only: Sequence[str] | None) -> tuple[pa.Table, str, tuple[ScorerInfo, ...]]:

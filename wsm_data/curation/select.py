@@ -4,7 +4,7 @@ A pure function of the index, the scores and the settings: neither threads nor t
 what is chosen.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -12,17 +12,17 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from wsm_data.curation.choose import choose_clips
+from wsm_data.curation.choose import PathReader, choose_clips
 from wsm_data.curation.diversity import DiversityConfig
 from wsm_data.curation.exclusion import Excluded, ExclusionConfig, excluded_clips
 from wsm_data.curation.explain import ExplainedScore, explain_clips
 from wsm_data.curation.key_order import key_hashes
 from wsm_data.curation.quotas import QUOTA_COLUMNS, QuotaConfig, column_codes, quota_table
-from wsm_data.curation.rule import Rating, RuleConfig, RuleKind, rate_clips
+from wsm_data.curation.rule import Rating, RuleConfig, RuleKind, rate_clips, ruling_scores
 from wsm_data.curation.scores_table import ScorerInfo, ScoreTable
 from wsm_data.curation.split import TRAIN
 from wsm_data.errors import ConfigError
-from wsm_data.schema.arrays import Float32Array, Float64Array
+from wsm_data.schema.arrays import Float64Array
 
 INDEX_COLUMNS = ("key", "split", *QUOTA_COLUMNS.values())
 """What a selection reads of the index."""
@@ -54,8 +54,13 @@ class SelectionConfig:
             raise ValueError(f"fraction must be above 0 and at most 1, found {self.fraction}")
 
     def score_names(self, scorers: tuple[ScorerInfo, ...]) -> tuple[str, ...]:
-        """Names of the scores that are read, of those there are."""
-        return tuple(dict.fromkeys([*self.rule.scores, *self.exclude.scores(scorers)]))
+        """Names of the scores that are read, of those there are.
+
+        Raises:
+            ConfigError: rule or exclusion names a score that is not there, or the rule one that has no hard end.
+        """
+        ruling = [one.name for one in ruling_scores(scorers, self.rule)]
+        return tuple(dict.fromkeys([*ruling, *self.exclude.scores(scorers)]))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -68,7 +73,7 @@ class ChosenClips:
         why: which scores made each clip hard; text [n].
         trajectories: clips of the split.
         excluded: clips of the split that were left out, by reason.
-        near_duplicates: clips left out for a harder one on nearly the same path.
+        near_duplicates: clips left out for one on nearly the same path that was taken before.
         over_quota: clips left out because a quota was full.
     """
 
@@ -84,7 +89,7 @@ class ChosenClips:
 def select_clips(
     index: pa.Table,
     scores: ScoreTable,
-    read_paths: Callable[[NDArray[np.int64]], Float32Array],
+    read_paths: PathReader,
     config: SelectionConfig,
 ) -> ChosenClips:
     """Choose clips.
@@ -92,15 +97,16 @@ def select_clips(
     Args:
         index: the columns `INDEX_COLUMNS` of the release's index.
         scores: scores of the same clips in the same order.
-        read_paths: from rows of the index to the outlines of their paths, world, m; float32 [M, P, 2].
+        read_paths: from rows of the index to the outlines of their paths.
         config: how.
 
     Raises:
-        ConfigError: the split has no clip, the rule names an unknown score, or the quotas cannot be met.
+        ConfigError: the split has no clip, the rule names an unknown score, a clip has no score of the rule, or the
+            quotas cannot be met.
     """
     rows = np.flatnonzero(np.asarray(pc.equal(index["split"], config.split)))
     count = _count(len(rows), config)
-    excluded = excluded_clips(scores, config.exclude, rows)
+    excluded = excluded_clips(scores, config.exclude, config.rule.scores, rows)
     candidates = rows[~excluded.clips]
     _require_enough(len(candidates), count, excluded, config)
     rating = rate_clips(scores, config.rule, candidates)

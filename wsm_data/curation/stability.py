@@ -1,6 +1,5 @@
 """How much of a selection is the same in another one, and how much of it hangs on which clips there happened to be."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -8,10 +7,11 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from wsm_data.curation.choose import PathReader
+from wsm_data.curation.path_outline import Outlines
 from wsm_data.curation.scores_table import ScoreTable
 from wsm_data.curation.select import SelectionConfig, select_clips
 from wsm_data.errors import ConfigError
-from wsm_data.schema.arrays import Float32Array
 
 
 def jaccard(a: NDArray[np.int64], b: NDArray[np.int64]) -> float:
@@ -36,7 +36,7 @@ class BootstrapOverlap:
 def bootstrap_overlap(
     index: pa.Table,
     scores: ScoreTable,
-    read_paths: Callable[[NDArray[np.int64]], Float32Array],
+    read_paths: PathReader,
     config: SelectionConfig,
     chosen: NDArray[np.int64],
     *,
@@ -82,7 +82,5 @@ def _drawn(rows: NDArray[np.int64], seed: int, sample: int) -> NDArray[np.int64]
     return rows[np.unique(raw % np.uint64(len(rows))).astype(np.int64)]
 
 
-def _paths_of(
-    read_paths: Callable[[NDArray[np.int64]], Float32Array], rows: NDArray[np.int64], numbers: NDArray[np.int64]
-) -> Float32Array:
+def _paths_of(read_paths: PathReader, rows: NDArray[np.int64], numbers: NDArray[np.int64]) -> Outlines:
     return read_paths(rows[numbers])

@@ -58,7 +58,8 @@ def test_every_clip_of_the_index_has_its_scores_in_order_and_they_stand_in_the_r
     for row, key in enumerate(opened.index.texts("key")):
         expected = score_clip(opened.read_clip(key), std, DctCodec(), ScoreConfig(release="").depth_samples)
         assert [table.columns[name][row] for name in NAMES] == list(expected.values.values()), key
-        assert outlines[row] == pytest.approx(expected.outline_xy_m, abs=1e-5)  # stored as float32
+        assert outlines.xy_m[row] == pytest.approx(expected.outline_xy_m, abs=1e-5)  # stored as float32
+        assert outlines.floor_z_m[row] == pytest.approx(expected.floor_z_m, abs=1e-6)
 
 
 def test_workers_and_interruptions_change_no_byte(score, monkeypatch):

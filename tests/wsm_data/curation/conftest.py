@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -9,11 +10,15 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
+from wsm_data.curation.path_outline import Outlines
 from wsm_data.curation.scores_table import Direction, ScorerInfo, ScoreTable
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "fakes"))
 
-from tiny_release import clips, make_clip, tiny  # noqa: F401
+from tiny_release import build_clip, clips, make_clip, tiny  # noqa: F401
+
+from wsm_data.schema.clip import Clip
+from wsm_data.schema.occupancy import FREE, OCCUPIED
 
 DIRECTIONS = {"ease_m": Direction.LOWER, "goal_reachable": Direction.NEUTRAL}
 
@@ -65,9 +70,27 @@ def far_paths() -> SimpleNamespace:
     """Paths that are near no other: `read(rows)` for as many clips as are asked for, and what was asked."""
     asked: list[int] = []
 
-    def read(rows: np.ndarray) -> np.ndarray:
+    def read(rows: np.ndarray) -> Outlines:
         asked.extend(rows.tolist())
         starts = np.stack([rows * 100.0, np.zeros(len(rows))], axis=1)
-        return np.stack([starts, starts + 5.0], axis=1).astype(np.float32)
+        paths = np.stack([starts, starts + 5.0], axis=1).astype(np.float32)
+        return Outlines(xy_m=paths, floor_z_m=np.zeros(len(rows), np.float32))
 
     return SimpleNamespace(read=read, asked=asked)
+
+
+@pytest.fixture
+def hall_clip() -> Callable[..., Clip]:
+    """A stored clip that goes 2 m straight along a hall of 3 m x 1 m; `walled`: through a wall across all of it."""
+
+    def make(number: int = 0, *, walled: bool = False) -> Clip:
+        T = ((1.0, 0.0, 0.0, 0.525), (0.0, 1.0, 0.0, 0.525), (0.0, 0.0, 1.0, 0.5), (0.0, 0.0, 0.0, 1.0))
+        goal = (2.525, 0.525, 0.5)
+        clip = build_clip(f"synth_d435i/home_0001/{number:06d}", T_world_camera0=T, goal_world_m=goal)
+        poses = np.zeros((clip.frame_count, 7), np.float32)
+        poses[:, 0], poses[:, 3] = np.linspace(0, 2, len(poses)), 1.0
+        cells = np.full((21, 61), FREE, np.uint8)
+        cells[:, 30:32] = OCCUPIED if walled else FREE
+        return replace(clip, poses=poses, occupancy=cells, geodesic_mm=np.zeros(cells.shape, np.uint16))
+
+    return make

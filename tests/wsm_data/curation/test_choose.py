@@ -6,11 +6,13 @@ from hypothesis import strategies as st
 
 from wsm_data.curation.choose import choose_clips
 from wsm_data.curation.diversity import discrete_frechet_m
+from wsm_data.curation.path_outline import Outlines
 from wsm_data.curation.quotas import Limits, Quota, QuotaConfig, column_codes, quota_table
 from wsm_data.errors import ConfigError
 
 CAMERA = st.sampled_from(["zed", "d435i"])
 SCENE = st.sampled_from("abc")
+FLOOR = st.sampled_from([-0.25, 0.0, 0.5, 2.75])  # 0.5 m apart is one floor, 0.75 m is not
 
 
 @pytest.fixture
@@ -25,10 +27,16 @@ def choose(make_index, far_paths):
     return go
 
 
-def straight(starts):
+def straight(starts, floors_m=None):
     """Paths of 5 m along x from each start."""
     starts = np.asarray(starts, np.float32)
-    return lambda rows: np.stack([starts[rows] + np.array([step, 0], np.float32) for step in range(6)], axis=1)
+    floors_m = np.zeros(len(starts), np.float32) if floors_m is None else np.asarray(floors_m, np.float32)
+
+    def read(rows):
+        paths = np.stack([starts[rows] + np.array([step, 0], np.float32) for step in range(6)], axis=1)
+        return Outlines(xy_m=paths, floor_z_m=floors_m[rows])
+
+    return read
 
 
 def test_without_bounds_the_hardest_are_chosen_and_no_path_is_read(choose, far_paths):
@@ -66,23 +74,32 @@ def test_the_hardest_of_near_duplicate_paths_of_a_scene_stands_for_them(choose):
     assert choose(places, 3, within_m=0.29, read=straight(starts)).places.tolist() == [0, 1, 2]
 
 
+def test_paths_one_above_the_other_are_two_paths(choose):
+    starts, floors_m = [(0, 0)] * 4, [0.0, 2.8, 0.4, 3.2]
+    found = choose(["a/zed"] * 4, 2, within_m=0.5, read=straight(starts, floors_m))
+    assert found.places.tolist() == [0, 1]
+    with pytest.raises(ConfigError, match="2 clips are near-duplicates"):
+        choose(["a/zed"] * 4, 3, within_m=0.5, read=straight(starts, floors_m))
+
+
 @given(
-    st.lists(st.tuples(SCENE, st.tuples(*[st.floats(-2, 2, width=16)] * 2)), min_size=1, max_size=25),
+    st.lists(st.tuples(SCENE, st.tuples(*[st.floats(-2, 2, width=16)] * 2), FLOOR), min_size=1, max_size=25),
     st.floats(0.1, 2),
 )
 def test_the_spatial_hash_finds_every_near_path(clips, within_m):
     """Against the walk that compares every clip with all that were chosen."""
-    paths = straight([start for _, start in clips])(np.arange(len(clips)))
+    read = straight([start for _, start, _ in clips], [floor_m for *_, floor_m in clips])
+    paths = read(np.arange(len(clips))).xy_m
     chosen = []
-    for number, (scene, _) in enumerate(clips):
-        near = [discrete_frechet_m(paths[number], paths[one]) <= within_m for one in chosen if clips[one][0] == scene]
-        if not any(near):
+    for number, (scene, _, floor_m) in enumerate(clips):
+        beside = [one for one in chosen if clips[one][0] == scene and abs(clips[one][2] - floor_m) <= 0.5]
+        if not any(discrete_frechet_m(paths[number], paths[one]) <= within_m for one in beside):
             chosen.append(number)
-    scenes = pa.array([scene for scene, _ in clips])
+    scenes = pa.array([scene for scene, *_ in clips])
     index = pa.table({"physical_scene": scenes, "group": scenes, "camera": scenes})
     quotas = quota_table(QuotaConfig(), index, len(chosen))
     codes = column_codes(index["physical_scene"])[1]
-    found = choose_clips(quotas, codes, len(chosen), within_m, lambda rows: paths[rows])
+    found = choose_clips(quotas, codes, len(chosen), within_m, read)
     assert found.places.tolist() == chosen
 
 

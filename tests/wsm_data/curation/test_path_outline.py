@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wsm_data.curation.path_outline import path_outline
+from wsm_data.curation.path_outline import Outlines, path_outline
 
 
 @given(seed=st.integers(0, 1000), count=st.integers(1, 12), points=st.integers(2, 40))
@@ -23,3 +23,17 @@ def test_points_lie_on_the_path_in_order_and_evenly_along_it(seed, count, points
 
 def test_a_path_without_length_is_its_position_again_and_again():
     assert path_outline(np.full((5, 2), 3.0), 4).tolist() == [[3.0, 3.0]] * 4
+
+
+def test_outlines_of_some_clips_keep_their_floors():
+    all_of_them = Outlines(
+        xy_m=np.arange(12, dtype=np.float32).reshape(3, 2, 2), floor_z_m=np.array([0, 3, 6], np.float32)
+    )
+    found = all_of_them.take(np.array([2, 0]))
+    assert found.xy_m[:, 0, 0].tolist() == [8, 0]
+    assert found.floor_z_m.tolist() == [6, 0]
+
+
+def test_every_outline_has_a_floor():
+    with pytest.raises(ValueError, match="floor_z_m must be"):
+        Outlines(xy_m=np.zeros((3, 2, 2), np.float32), floor_z_m=np.zeros(2, np.float32))

@@ -69,3 +69,15 @@ def test_quotas_that_cannot_be_met_are_refused_by_their_name(make_index, config,
 def test_a_bound_is_a_share_or_a_whole_number(value):
     with pytest.raises(ValueError, match="a share below 1 or a whole number"):
         Limits(at_least=value)
+
+
+@pytest.mark.parametrize("side", ["at_least", "at_most"])
+@pytest.mark.parametrize("bound", [float("nan"), float("inf"), -0.1, 1.5])
+def test_a_bound_is_a_share_or_a_whole_number_of_clips(side, bound):
+    with pytest.raises(ValueError, match=f"{side} must be a share below 1 or a whole number of clips, found {bound}"):
+        Limits(**{side: bound})
+
+
+def test_one_is_one_clip_and_no_share(make_index):
+    found = bounds(quota_table(QuotaConfig(scene=Quota(at_most=1.0, named={"g/c": Limits()})), make_index(PLACES), 5))
+    assert (found["scene g/a"], found["scene g/c"]) == ((0, 1), (0, 5))

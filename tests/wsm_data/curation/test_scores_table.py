@@ -6,6 +6,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from wsm_data.curation.path_outline import Outlines
 from wsm_data.curation.scores_table import (
     Direction,
     ScorerInfo,
@@ -36,14 +37,17 @@ def table():
 
 
 @pytest.fixture
-def paths():
-    return np.random.default_rng(0).normal(size=(3, 32, 2)).astype(np.float32)
+def outlines():
+    rng = np.random.default_rng(0)
+    return Outlines(
+        xy_m=rng.normal(size=(3, 32, 2)).astype(np.float32), floor_z_m=rng.normal(size=3).astype(np.float32)
+    )
 
 
 @pytest.fixture
-def file(tmp_path, table, paths):
+def file(tmp_path, table, outlines):
     path = tmp_path / "scores.parquet"
-    write_scores(path, table, paths)
+    write_scores(path, table, outlines)
     return path
 
 
@@ -56,9 +60,11 @@ def test_what_is_written_is_read_to_the_bit_absent_values_included(file, table):
     assert len(found) == 3
 
 
-def test_equal_tables_give_equal_bytes(file, table, paths, tmp_path):
+def test_equal_tables_give_equal_bytes(file, table, outlines, tmp_path):
     other = tmp_path / "again.parquet"
-    write_scores(other, replace(table, keys=pa.concat_arrays([table.keys[:1], table.keys[1:]])), paths.copy())
+    write_scores(
+        other, replace(table, keys=pa.concat_arrays([table.keys[:1], table.keys[1:]])), outlines.take(np.arange(3))
+    )
     assert other.read_bytes() == file.read_bytes()
 
 
@@ -69,10 +75,39 @@ def test_only_the_scores_that_are_asked_for_are_read_and_an_unknown_one_is_named
         read_scores(file, release_digest="d1", only=["widht_m"])
 
 
-def test_outlines_of_some_clips_are_read_in_any_order(file, paths):
+def test_outlines_of_some_clips_are_read_in_any_order_with_their_floors(file, outlines):
     rows = np.array([2, 0, 2])
-    assert np.array_equal(read_paths(file, rows), paths[rows])
-    assert read_paths(file, rows[:0]).shape == (0, 32, 2)
+    found = read_paths(file, rows)
+    assert np.array_equal(found.xy_m, outlines.xy_m[rows])
+    assert np.array_equal(found.floor_z_m, outlines.floor_z_m[rows])
+    assert read_paths(file, rows[:0]).xy_m.shape == (0, 32, 2)
+
+
+def test_outlines_are_read_across_the_groups_in_which_they_are_stored(file, table, outlines, monkeypatch):
+    monkeypatch.setattr("wsm_data.curation.scores_table._ROW_GROUP_ROWS", 2)
+    write_scores(file, table, outlines)
+    assert np.array_equal(read_paths(file, np.array([2, 1, 0])).xy_m, outlines.xy_m[::-1])
+
+
+def test_an_outline_is_stored_as_its_numbers_one_after_the_other(file, outlines):
+    stored = pq.read_table(file)["path_xy_m"].to_pylist()
+    assert stored[1] == outlines.xy_m[1].astype("<f4").tobytes()
+
+
+@pytest.mark.parametrize("column", ["path_xy_m", "floor_z_m"])
+def test_a_clip_without_an_outline_or_a_floor_is_damage(file, column):
+    stored = pq.read_table(file)
+    rewritten(file, **{column: pa.array([*stored[column].to_pylist()[:2], None], stored.schema.field(column).type)})
+    with pytest.raises(IntegrityError, match="every clip must have an outline and a floor"):
+        read_paths(file, np.arange(3))
+
+
+def test_a_path_or_a_floor_that_is_no_number_is_a_bug_of_the_caller(tmp_path, table, outlines):
+    for name in ("xy_m", "floor_z_m"):
+        bad = getattr(outlines, name).copy()
+        bad[1] = NAN
+        with pytest.raises(ValueError, match=f"{name} must be finite"):
+            write_scores(tmp_path / "bad.parquet", table, replace(outlines, **{name: bad}))
 
 
 def test_another_release_is_refused_with_both_digests_and_the_clips_that_differ(file):
@@ -100,10 +135,12 @@ def test_a_difference_of_nothing_but_the_digest_says_so():
     ("name", "values", "found"),
     [("width_m", [0.1, NAN, 2.0], "no value"), ("width_m", [0.1, INF, 2.0], "inf"), ("cost", [0.1, -INF, 2.0], "-inf")],
 )
-def test_a_value_that_is_no_number_is_not_written_and_names_score_and_clip(tmp_path, table, paths, name, values, found):
+def test_a_value_that_is_no_number_is_not_written_and_names_score_and_clip(
+    tmp_path, table, outlines, name, values, found
+):
     bad = replace(table, columns={**table.columns, name: np.array(values)})
     with pytest.raises(ConfigError, match=f"{name} of clip g/s/1 must be a number, found {found}; 1 clips"):
-        write_scores(tmp_path / "bad.parquet", bad, paths)
+        write_scores(tmp_path / "bad.parquet", bad, outlines)
     assert list(tmp_path.glob("*bad*")) == []
 
 
@@ -139,7 +176,7 @@ def test_damage_is_told_from_a_wrong_request(file, tmp_path):
             read_scores(file, release_digest="d1")
     other = tmp_path / "other.parquet"
     pq.write_table(pa.table({"key": ["a"]}), other)
-    with pytest.raises(IntegrityError, match="its version must be 1, found None"):
+    with pytest.raises(IntegrityError, match="its version must be 2, found None"):
         read_scores(other, release_digest="d1")
 
 

@@ -9,6 +9,8 @@ from wsm_data.curation.exclusion import ExclusionConfig
 from wsm_data.curation.key_order import key_hashes
 from wsm_data.curation.quotas import Quota, QuotaConfig
 from wsm_data.curation.rule import RuleConfig, RuleKind, rate_clips
+from wsm_data.curation.score_clip import CLIP_SCORES, score_clip
+from wsm_data.curation.scores_table import ScoreTable
 from wsm_data.curation.select import SelectionConfig, explained_scores, hardest_first, select_clips
 from wsm_data.errors import ConfigError
 
@@ -66,6 +68,32 @@ def test_excluded_clips_are_not_chosen_and_count_as_trajectories(select, make_sc
     found = select(scores)
     assert found.rows.tolist() == [18, 17]
     assert (found.trajectories, found.excluded) == (20, {"goal_reachable at most 0": 1})
+
+
+def test_a_clip_whose_path_leads_through_a_wall_is_excluded(select, hall_clip):
+    scored = [score_clip(hall_clip(number, walled=number == 2), np.ones(48), None, 0).values for number in range(4)]
+    columns = {one.name: np.array([values[one.name] for values in scored]) for one in CLIP_SCORES}
+    keys = pa.array([f"k{number}" for number in range(4)])
+    scores = ScoreTable(release_digest="d1", scorers=CLIP_SCORES, keys=keys, columns=columns)
+    found = select(scores, fraction=0.75, rule=RuleConfig(), places=["a/zed"] * 4)
+    assert sorted(found.rows.tolist()) == [0, 1, 3]
+    assert found.excluded["goal_reachable at most 0"] == 1
+
+
+def test_clips_without_a_score_are_left_out_where_that_is_asked_for(select, make_scores):
+    rule = RuleConfig(kind=RuleKind.LEXICOGRAPHIC, order=("unsafe", "cost"))
+    scores = make_scores(unsafe=[0.5, np.nan, np.nan, np.nan], cost=[np.nan, np.nan, 1.0, np.nan])
+    with pytest.raises(ConfigError, match=r"2 clips have none of the scores .*exclude\.unscored=true"):
+        select(scores, rule=rule, fraction=0.5)
+    found = select(scores, rule=rule, fraction=0.5, exclude=ExclusionConfig(unscored=True))
+    assert found.rows.tolist() == [0, 2]
+    assert found.excluded == {"having no score of the rule": 2}
+
+
+def test_a_rule_by_scores_that_are_not_there_is_refused_with_what_to_do(make_scores):
+    config = SelectionConfig(rule=RuleConfig(kind=RuleKind.LEXICOGRAPHIC))
+    with pytest.raises(ConfigError, match=r"'rollout_unsafe_share'.*evaluate a policy first"):
+        config.score_names(make_scores(detour=[1]).scorers)
 
 
 def test_a_lexicographic_rule_is_explained_in_its_order(select, make_scores):
