@@ -27,7 +27,7 @@ class Trajectory:
         intrinsics: the camera.
         goal_xy_m: the goal over the floor, world, m; float64 [2].
         goal_radius_m: radius r_g of the goal region, m.
-        start_distance_m: geodesic distance D of the first position to the goal region, m.
+        start_distance_m: geodesic distance D of the first position to the goal region, m; infinite without a way.
         map: what is known of the floor; path and goal lie inside it, at least a cell from its rim.
         robot_radius_m: radius of the footprint, m.
     """

@@ -1,8 +1,10 @@
 import math
+from dataclasses import replace
 
 import pytest
 
-from wsm_data.curation.scorers.detour import detour_ratio
+from wsm_data.curation.scorers.detour import DETOUR, detour_ratio
+from wsm_data.curation.scorers.scorer import require_score
 from wsm_data.maps.geodesic import geodesic_distance
 from wsm_data.maps.progress import sample_distance
 
@@ -41,3 +43,8 @@ def test_inside_the_goal_region_it_is_one_and_it_is_never_below(drive, floor):
     grid = floor(6.0, 6.0)
     assert detour_ratio(drive(grid, [(1.0, 1.0), (1.1, 1.0)], start_distance_m=0.0)) == 1.0
     assert detour_ratio(drive(grid, [(1.0, 1.0), (3.0, 1.0)], start_distance_m=1.799)) == 1.0
+
+
+def test_without_a_way_there_is_no_ratio(home):
+    assert detour_ratio(replace(home, start_distance_m=math.inf)) is None
+    assert math.isnan(require_score(DETOUR.info, None, "k"))
