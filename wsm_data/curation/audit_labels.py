@@ -9,12 +9,12 @@ from scipy.spatial import cKDTree
 
 from wsm_data.curation.audit_finding import AuditFinding, Check, Severity
 from wsm_data.curation.clip_labels import ClipLabels
-from wsm_data.curation.diversity import discrete_frechet_m, paths_are_near
+from wsm_data.curation.diversity import SAME_FLOOR_M, discrete_frechet_m, paths_are_near
 from wsm_data.curation.split import TRAIN
 from wsm_data.schema.arrays import Float32Array
 
-_SAME_FLOOR_M = 0.5
-"""Floors of one scene that differ by more are different floors."""
+SAME_PATH_M = 0.1
+"""Paths that stay this close are one path driven twice: two cells of a map, as far as starts that count as the same."""
 
 _SHOWN_CLIPS = 5
 
@@ -22,19 +22,29 @@ _SHOWN_CLIPS = 5
 def near_duplicates_across_splits(labels: Sequence[ClipLabels], within_m: float) -> Iterator[AuditFinding]:
     """Held-out clips whose path runs beside one that is trained on, in one physical scene and on one floor.
 
+    It is an error where the two are one path (`SAME_PATH_M`), or where the same physical scene was filmed by another
+    camera, and otherwise a warning. Each clip is named once, with the training clip that is worst, or else nearest.
+
     Args:
         labels: all clips.
         within_m: largest discrete Frechet distance of the paths, m.
     """
     for clips in _groups(labels, lambda one: one.row.physical_scene):
-        trained = [one for one in clips if one.row.split == TRAIN]
-        others = np.array([one.outline_xy_m for one in trained], np.float32)
+        trained = defaultdict(list)
         for one in clips:
-            if one.row.split == TRAIN or not trained:
+            if one.row.split == TRAIN:
+                trained[one.row.camera].append(one)
+        outlines = {camera: np.array([one.outline_xy_m for one in of], np.float32) for camera, of in trained.items()}
+        for one in clips:
+            if one.row.split == TRAIN:
                 continue
-            nearest, distance_m = _nearest(one.outline_xy_m.astype(np.float32), others, within_m)
-            if nearest >= 0:
-                yield _near(one, trained[nearest], distance_m)
+            found = []
+            for camera, others in outlines.items():
+                nearest, distance_m = _nearest(one.outline_xy_m.astype(np.float32), others, within_m)
+                if nearest >= 0:
+                    found.append((distance_m, _near(one, trained[camera][nearest], distance_m)))
+            if found:
+                yield min(found, key=lambda pair: (-pair[1].severity.rank, pair[0]))[1]
 
 
 def distance_conflicts(labels: Sequence[ClipLabels], same_place_m: float, tolerance_m: float) -> Iterator[AuditFinding]:
@@ -85,7 +95,7 @@ def _groups(labels: Sequence[ClipLabels], scene_of: Callable[[ClipLabels], str])
     for _, clips in sorted(scenes.items()):
         clips.sort(key=lambda one: float(one.start_m[2]))
         heights_m = np.array([one.start_m[2] for one in clips])
-        for floor in np.split(np.arange(len(clips)), np.flatnonzero(np.diff(heights_m) > _SAME_FLOOR_M) + 1):
+        for floor in np.split(np.arange(len(clips)), np.flatnonzero(np.diff(heights_m) > SAME_FLOOR_M) + 1):
             yield sorted((clips[number] for number in floor), key=lambda one: one.row.key)
 
 
@@ -102,13 +112,12 @@ def _nearest(path: Float32Array, others: Float32Array, within_m: float) -> tuple
 
 
 def _near(held_out: ClipLabels, trained: ClipLabels, distance_m: float) -> AuditFinding:
+    across = held_out.row.camera != trained.row.camera
     cameras = f"{held_out.row.camera} and {trained.row.camera}"
-    seen_by = (
-        f"across cameras {cameras}" if held_out.row.camera != trained.row.camera else f"camera {trained.row.camera}"
-    )
+    seen_by = f"across cameras {cameras}" if across else f"camera {trained.row.camera}"
     return AuditFinding(
         check=Check.PATH_IN_SPLITS,
-        severity=Severity.WARNING,
+        severity=Severity.ERROR if across or distance_m <= SAME_PATH_M else Severity.WARNING,
         clips=(held_out.row.key, trained.row.key),
         message=(
             f"the path of the first, in {held_out.row.split}, runs within {distance_m:.2f} m of that of the second, in "

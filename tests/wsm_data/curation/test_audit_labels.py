@@ -38,8 +38,21 @@ def test_a_held_out_path_beside_a_training_path_is_found_with_the_nearest():
 
 
 def test_near_paths_are_found_across_the_cameras_of_one_physical_scene():
-    [found] = near_duplicates_across_splits([labels(1), labels(2, camera="d435i", split="test")], 0.5)
+    [found] = near_duplicates_across_splits([labels(1), labels(2, camera="d435i", y_m=0.4, split="test")], 0.5)
     assert "across cameras d435i and zed" in found.message
+    assert found.severity is Severity.ERROR
+
+
+@pytest.mark.parametrize(("y_m", "severity"), [(0.0, Severity.ERROR), (0.09, Severity.ERROR), (0.11, Severity.WARNING)])
+def test_one_path_driven_twice_is_an_error_and_one_beside_it_a_warning(y_m, severity):
+    [found] = near_duplicates_across_splits([labels(1), labels(2, y_m=y_m, split="test")], 0.5)
+    assert found.severity is severity
+
+
+def test_a_clip_is_named_once_with_the_worst_of_its_neighbours():
+    clips = [labels(1), labels(2, y_m=0.2), labels(3, camera="d435i", y_m=0.6), labels(4, y_m=0.3, split="test")]
+    [found] = near_duplicates_across_splits(clips, 0.5)
+    assert (found.severity, found.clips[1]) == (Severity.ERROR, "g_d435i/home/3")
 
 
 @pytest.mark.parametrize("other", [{"scene": "other"}, {"floor_m": 3.0}, {"split": "test"}])
