@@ -21,6 +21,10 @@ _NOTABLE = 0.5
 """A score by which a clip is easier than half of all is no reason, unless it has no better one."""
 
 _DIGITS = 3
+_LEAST_POWER, _MOST_POWER = -300, 308
+_POWERS_OF_TEN = np.array([float(f"1e{power}") for power in range(_LEAST_POWER, _MOST_POWER + 1)])
+"""As they are written, to the last bit: `pow` differs there from processor to processor, and a text with it."""
+
 _ROUNDING = 1e-4  # a percentile is float32: 0.9 of 100 is 90
 _NO_UNIT = ("", "ratio")
 _UNIT_SUFFIX = re.compile(r"_(m|rad|share|ratio|rad_per_frame)$")
@@ -73,6 +77,23 @@ def leading_scores(scores: Sequence[ExplainedScore]) -> NDArray[np.int64]:
     return np.asarray(_shares(scores).argmax(axis=1))
 
 
+def deciding_scores(scores: Sequence[ExplainedScore], left_out: int | None) -> NDArray[np.int64]:
+    """Number of the score by which a lexicographic rule put each clip before the first one that was left out.
+
+    Args:
+        scores: the scores of the rule, in its order.
+        left_out: number of that clip among those that are explained; None where none was left out.
+
+    Returns:
+        int64 [n]: the first score a clip has whose value is not that of `left_out`, or the first that it has where
+        there is no such one.
+    """
+    values = np.stack([one.values for one in scores], axis=1)
+    known = ~np.isnan(values)
+    told = known & (values != values[left_out]) if left_out is not None else known
+    return np.asarray(np.where(told.any(axis=1, keepdims=True), told, known).argmax(axis=1))
+
+
 def value_text(value: float, unit: str) -> str:
     """A value with its unit; a share in per cent."""
     if unit == "share":
@@ -114,19 +135,20 @@ def _ranked(scores: Sequence[ExplainedScore], in_order: bool) -> NDArray[np.int6
 def _texts(score: ExplainedScore) -> tuple[list[str], NDArray[np.int64]]:
     """The texts of a score, and for every clip the number of its own; int64 [n]. Those without a value mean nothing."""
     values = np.nan_to_num(score.values)
-    size = np.abs(values)
-    power = np.floor(np.log10(size, out=np.zeros(len(size)), where=size > 0)).astype(np.int64) - (_DIGITS - 1)
-    digits = np.rint(values / 10.0**power).astype(np.int64)
+    values[np.abs(values) < _POWERS_OF_TEN[_DIGITS]] = 0.0
+    place = np.searchsorted(_POWERS_OF_TEN, np.abs(values), side="right") - _DIGITS  # of the last digit shown
+    place[values == 0] = -_LEAST_POWER
+    digits = np.rint(values / _POWERS_OF_TEN[place]).astype(np.int64)
     shares = np.nan_to_num(score.percentiles.astype(np.float64))
     below = 1 - shares if score.info.direction is Direction.LOWER else shares
     percent = np.clip(np.floor(100 * below + _ROUNDING), 1, 99).astype(np.int64)
-    parts = np.stack([power, digits, percent])
+    parts = np.stack([place + _LEAST_POWER, digits, percent])
     spans = parts.max(axis=1, initial=0) - parts.min(axis=1, initial=0) + 1
     code = np.ravel_multi_index(tuple(parts - parts.min(axis=1, initial=0)[:, None]), tuple(spans))
     _, first, numbers = np.unique(code, return_index=True, return_inverse=True)
     label, unit = score_label(score.info), score.info.unit
     texts = [
-        f"{label} {value_text(digit * 10.0**exponent, unit)} ({_ordinal(share)} percentile)"
+        f"{label} {value_text(float(f'{digit}e{exponent}'), unit)} ({_ordinal(share)} percentile)"
         for exponent, digit, share in parts[:, first].T.tolist()
     ]
     return texts, numbers.astype(np.int64)

@@ -27,6 +27,7 @@ from wsm_data.shards.names import SELECTIONS_FOLDER
 SELECTION_SUFFIX = ".parquet"
 SELECTION_VERSION = 1
 _METADATA = b"wsm.selection"
+_SHOWN_CLIPS = 3
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 _SCHEMA = pa.schema([("key", pa.string()), ("rank", pa.int64()), ("score", pa.float64()), ("why", pa.string())])
 
@@ -143,13 +144,16 @@ def write_selection(path: Path, selection: Selection) -> None:
         )
 
 
-def read_selection(release: Store | str | Path, name: str, release_digest: str) -> Selection:
+def read_selection(
+    release: Store | str | Path, name: str, release_digest: str, index: IndexTable | None = None
+) -> Selection:
     """Read a selection of a release.
 
     Args:
         release: the release, or its folder or URL.
         name: name of a selection that stands in the release, or path or URL of a file that ends in `.parquet`.
         release_digest: digest of the release that is to be read.
+        index: its index, where it is at hand: a refusal then says which clips it does not have.
 
     Raises:
         ConfigError: there is no such selection, or it was made from another release.
@@ -161,10 +165,21 @@ def read_selection(release: Store | str | Path, name: str, release_digest: str) 
     if selection.release_digest != release_digest:
         raise ConfigError(
             f"{where} was made from the release with digest {selection.release_digest}, but the release at "
-            f"{store.root} has digest {release_digest}; read it with that release, or select again: "
-            f"{selection.command}"
+            f"{store.root} has digest {release_digest}{_gone(selection, index)}; read it with that release, or select "
+            f"again: {selection.command}"
         )
     return selection
+
+
+def _gone(selection: Selection, index: IndexTable | None) -> str:
+    """What a message says of the clips of a selection that an index does not have."""
+    if index is None:
+        return ""
+    gone = np.flatnonzero(index.rows_of(selection.keys) < 0)
+    if not len(gone):
+        return f", and all {len(selection)} clips are still there"
+    shown = ", ".join(selection.keys[int(number)].as_py() for number in gone[:_SHOWN_CLIPS])
+    return f", and {len(gone)} of its {len(selection)} clips are gone, such as {shown}"
 
 
 def parse_selection(data: bytes, where: str) -> Selection:

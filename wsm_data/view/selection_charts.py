@@ -30,9 +30,10 @@ def compared_histogram(everything: Float64Array, chosen: Float64Array, label: st
     all_shares, chosen_shares = (_shares(values, edges) for values in (everything, chosen))
     axes.stairs(all_shares, edges, fill=True, color=BAR, alpha=0.55, lw=0)
     axes.stairs(chosen_shares, edges, color=BAR_SECOND, lw=2.2)
-    beyond = [100 * float((values > edges[-1]).mean()) for values in (everything, chosen) if len(values)]
-    if any(beyond):
-        text = f"beyond: {' % of all, '.join(f'{share:.2g}' for share in beyond)} % of chosen"
+    named = {"all": everything, "chosen": chosen}
+    beyond = {name: 100 * float((values > edges[-1]).mean()) for name, values in named.items() if len(values)}
+    if any(beyond.values()):
+        text = f"beyond: {', '.join(f'{share:.2g} % of {name}' for name, share in beyond.items())}"
         axes.set_title(text, loc="right", fontsize=9, fontweight="normal", color=MUTED)
     axes.set(xlabel=label, ylabel="share of clips (%)", xlim=(edges[0], edges[-1]))
     axes.xaxis.set_major_locator(MaxNLocator(nbins=5))

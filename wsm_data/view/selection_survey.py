@@ -1,5 +1,6 @@
 """Everything the report of a selection shows: numbers of all its clips, pictures of some."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -10,11 +11,12 @@ from numpy.typing import NDArray
 
 from wsm_data.codecs.base import VideoCodec
 from wsm_data.curation.exclusion import excluded_clips
-from wsm_data.curation.explain import explain_clips, leading_scores
+from wsm_data.curation.explain import ExplainedScore, deciding_scores, explain_clips, leading_scores
+from wsm_data.curation.key_order import key_hashes
 from wsm_data.curation.quotas import QUOTA_COLUMNS, column_codes, quota_table
 from wsm_data.curation.rule import RuleKind, rate_clips
 from wsm_data.curation.scores_table import ScorerInfo, ScoreTable, read_paths, read_scores
-from wsm_data.curation.select import INDEX_COLUMNS, SelectionConfig, explained_scores
+from wsm_data.curation.select import INDEX_COLUMNS, SelectionConfig, explained_scores, hardest_first
 from wsm_data.curation.stability import BootstrapOverlap, bootstrap_overlap, jaccard
 from wsm_data.errors import ConfigError
 from wsm_data.files.typed_toml import build_config
@@ -53,7 +55,8 @@ class ScoreSurvey:
     Attributes:
         info: the score.
         weight: its share in the rule; 0 where the rule does not read it.
-        leads: chosen clips that it makes hardest of all scores.
+        leads: chosen clips that it made hard: by the largest share of their difficulty, or, where a rule goes by the
+            order of scores, by telling them from the first clip that was left out.
         values: of the clips of the split that have one; float64.
         chosen: of the chosen ones; float64.
     """
@@ -110,11 +113,11 @@ class SelectionSurvey:
     Attributes:
         selection: the selection.
         config: how it was made.
-        scores: every score there is, those of the rule first.
+        scores: every score there is, those of the rule first: by weight, and in its order.
         difficulty: of the candidates, float64; those that were chosen have the largest, but for quotas and duplicates.
         places: quotas and how they were filled, by kind.
         hardest: clips from the top.
-        borderline: the last that were chosen, and the first that were not.
+        borderline: the last that were chosen, and the first that are no harder and were not.
         others: name, clips, common clips and Jaccard index of the release's other selections.
         bootstrap: the same rule under bootstrap.
         listed: rank, key, difficulty and reasons of the first clips.
@@ -150,7 +153,7 @@ def survey_selection(
     """
     shown = shown or SelectionSurveyConfig()
     digest = release_digest(release.manifest)
-    selection = read_selection(release.store, name, digest)
+    selection = read_selection(release.store, name, digest, release.index)
     config = selection_settings(selection)
     scores = read_scores(scores_location, release_digest=digest, release_keys=release.index.columns(["key"])["key"])
     index = release.index.columns(INDEX_COLUMNS)
@@ -192,7 +195,8 @@ class _Rated:
         chosen_rows: rows of the chosen clips, hardest first.
         difficulty: of each candidate.
         chosen: chosen candidates, hardest first.
-        left: the others, hardest first.
+        left: those of the others that are no harder than the easiest chosen one, in the order of the walk. Harder
+            ones were passed over: near-duplicates, and clips over a quota.
         rows: row of each candidate.
         why: reasons of each candidate.
         leading: which score of the rule made each chosen clip hardest.
@@ -214,14 +218,16 @@ class _Rated:
 def _rated(index: pa.Table, scores: ScoreTable, config: SelectionConfig, chosen_rows: NDArray[np.int64]) -> _Rated:
     codes, splits = column_codes(index["split"])[1], column_codes(index["split"])[0]
     split = np.flatnonzero(codes == splits.index(config.split))
-    rows = split[~excluded_clips(scores, config.exclude, split).clips]
+    rows = split[~excluded_clips(scores, config.exclude, config.rule.scores, split).clips]
     rating = rate_clips(scores, config.rule, rows)
     everybody = np.arange(len(rows))
     explained = explained_scores(scores, config.rule, rating, rows, everybody)
     number = np.full(len(index), -1, np.int64)
     number[rows] = everybody
     chosen = number[chosen_rows]
-    others = np.setdiff1d(everybody, chosen)
+    walk = hardest_first(rating.difficulty, key_hashes(scores.keys)[rows])
+    easiest = rating.difficulty[chosen].min()
+    left = walk[(rating.difficulty[walk] <= easiest) & ~np.isin(walk, chosen)]
     return _Rated(
         index=index,
         scores=scores,
@@ -230,11 +236,20 @@ def _rated(index: pa.Table, scores: ScoreTable, config: SelectionConfig, chosen_
         chosen_rows=chosen_rows,
         difficulty=rating.difficulty,
         chosen=chosen,
-        left=others[np.argsort(-rating.difficulty[others], kind="stable")],
+        left=left,
         rows=rows,
         why=explain_clips(explained, in_order=config.rule.kind is RuleKind.LEXICOGRAPHIC),
-        leading=leading_scores(explained)[chosen],
+        leading=_leading(explained, config, left)[chosen],
     )
+
+
+def _leading(
+    explained: Sequence[ExplainedScore], config: SelectionConfig, left: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """Which score of the rule made each candidate hard."""
+    if config.rule.kind is RuleKind.WEIGHTED:
+        return leading_scores(explained)
+    return deciding_scores(explained, int(left[0]) if len(left) else None)
 
 
 def _score_surveys(state: _Rated) -> tuple[ScoreSurvey, ...]:
@@ -251,7 +266,8 @@ def _score_surveys(state: _Rated) -> tuple[ScoreSurvey, ...]:
         )
         for info in state.scores.scorers
     ]
-    return tuple(sorted(surveys, key=lambda one: -one.weight))
+    place = {name: number for number, name in enumerate(weights)}
+    return tuple(sorted(surveys, key=lambda one: (-one.weight, place.get(one.info.name, len(place)))))
 
 
 def _known(values: Float64Array) -> Float64Array:

@@ -3,7 +3,14 @@ import re
 import numpy as np
 import pytest
 
-from wsm_data.curation.explain import ExplainedScore, explain_clips, leading_scores, score_label, value_text
+from wsm_data.curation.explain import (
+    ExplainedScore,
+    deciding_scores,
+    explain_clips,
+    leading_scores,
+    score_label,
+    value_text,
+)
 from wsm_data.curation.scores_table import Direction, ScorerInfo
 
 
@@ -91,3 +98,26 @@ def test_with_emphasis_an_extreme_score_weighs_more_than_a_heavy_one():
     for emphasis, leading in ((1, 0), (2, 1)):
         scores = [score("heavy", emphasis=emphasis, **heavy), score("extreme", emphasis=emphasis, **extreme)]
         assert leading_scores(scores).tolist() == [leading]
+
+
+def test_a_lexicographic_rule_is_led_by_the_score_that_tells_a_clip_from_the_first_left_out():
+    percentiles = [0.5] * 5
+    scores = [
+        score("unsafe", [1.0, 0.5, 0.5, np.nan, 0.5], percentiles),
+        score("cost", [2.0, 9.0, 3.0, 4.0, 3.0], percentiles),
+    ]
+    assert deciding_scores(scores, 4).tolist() == [0, 1, 0, 1, 0]  # the third is equal in both: its first score
+    assert deciding_scores(scores, None).tolist() == [0, 0, 0, 1, 0]
+
+
+def test_a_score_that_only_the_clip_left_out_lacks_decides():
+    scores = [score("unsafe", [0.0, np.nan], [0.5, np.nan]), score("cost", [1.0, 1.0], [0.5, 0.5])]
+    assert deciding_scores(scores, 1).tolist() == [0, 1]
+
+
+def test_texts_hold_the_digits_of_the_value_over_all_powers_of_ten():
+    values = [1.5e-296, 9.996e-4, 0.9999, 1.0, 999.4, 999.6, 1e15, 1.7e308, -0.125, 1e-310]
+    found = explain_clips([score("x_m", values, [0.9] * len(values), unit="m")]).to_pylist()
+    shown = [float(text.split()[1].replace(",", "")) for text in found]
+    assert shown[:-1] == [float(f"{value:.2e}") for value in values[:-1]]
+    assert shown[-1] == 0.0

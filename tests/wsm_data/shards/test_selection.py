@@ -153,3 +153,15 @@ def test_many_clips_are_written_and_read_in_columns(tmp_path):
     write_selection(tmp_path / "many.parquet", many)
     found = read_selection(tmp_path, str(tmp_path / "many.parquet"), "d1")
     assert found.keys == many.keys
+
+
+def test_with_its_index_a_changed_release_is_refused_with_the_clips_that_are_gone(tiny):
+    release = open_release(tiny.folder)
+    keys = release.index.texts("key")
+    for found, words in (
+        ([*keys[:2], "g/s/gone"], "and 1 of its 3 clips are gone, such as g/s/gone; read it"),
+        (keys[:2], "and all 2 clips are still there; read it"),
+    ):
+        write_selection(tiny.folder / selection_path("hard"), selection(found))
+        with pytest.raises(ConfigError, match=words):
+            read_selection(release.store, "hard", release_digest(release.manifest), release.index)

@@ -1,6 +1,6 @@
 """Small clips of a walled room, decodable by the dct codec, and a release of six of them."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -15,9 +15,10 @@ from pipelines.config import settings_of
 from wsm_data.codecs.dct import DctCodec
 from wsm_data.codecs.depth import normalise_depth
 from wsm_data.codecs.quality import CodecQuality, DepthErrors
+from wsm_data.curation.path_outline import PATH_POINTS, Outlines
 from wsm_data.curation.quotas import Limits, Quota, QuotaConfig
 from wsm_data.curation.rule import RuleConfig
-from wsm_data.curation.scores_table import PATH_POINTS, Direction, ScorerInfo, ScoreTable, write_scores
+from wsm_data.curation.scores_table import Direction, ScorerInfo, ScoreTable, write_scores
 from wsm_data.curation.select import INDEX_COLUMNS, SelectionConfig, select_clips
 from wsm_data.geometry.transform import invert
 from wsm_data.schema.camera import Intrinsics
@@ -33,6 +34,7 @@ from wsm_data.shards.plan import PlannedClip, plan_shards
 from wsm_data.shards.release import Release, open_release
 from wsm_data.shards.selection import Selection, selection_path, write_selection
 from wsm_data.shards.writer import write_shard
+from wsm_data.view.selection_survey import SelectionSurvey, SelectionSurveyConfig, survey_selection
 
 CODEC = DctCodec()
 WIDTH_PX, HEIGHT_PX = 64, 32
@@ -261,14 +263,17 @@ def selected(tmp_path_factory) -> SimpleNamespace:
     )
     keys = pa.array(index["key"].to_pylist())
     scores = ScoreTable(release_digest=digest, scorers=infos, keys=keys, columns=columns)
-    paths = np.zeros((count, PATH_POINTS, 2), np.float32) + 10 * np.arange(count, dtype=np.float32)[:, None, None]
-    write_scores(folder / "scores.parquet", scores, paths)
+    outlines = Outlines(
+        xy_m=np.zeros((count, PATH_POINTS, 2), np.float32) + 10 * np.arange(count, dtype=np.float32)[:, None, None],
+        floor_z_m=np.zeros(count, np.float32),
+    )
+    write_scores(folder / "scores.parquet", scores, outlines)
     config = SelectionConfig(
         fraction=0.5,
         rule=RuleConfig(weights={"detour_ratio": 3.0, "clearance_least_m": 1.0}),
         quotas=QuotaConfig(scene=Quota(at_most=1), camera=Quota(named={"zed": Limits(at_least=1)})),
     )
-    chosen = select_clips(index, scores, lambda rows: paths[rows], config)
+    chosen = select_clips(index, scores, outlines.take, config)
     selection = Selection(
         name="hard",
         release_digest=digest,
@@ -296,3 +301,50 @@ def selected(tmp_path_factory) -> SimpleNamespace:
         selection=selection,
         detour_of_split=columns["detour_ratio"][np.asarray(index["split"].to_pylist()) == "train"].tolist(),
     )
+
+
+@pytest.fixture
+def survey_of(selected, tmp_path) -> Callable[..., SelectionSurvey]:
+    """Surveys a selection of two of the four training clips, by scores that are given for them, in the file's order.
+
+    `paths` are numbers of paths: clips of one number are near-duplicates.
+    """
+
+    def make(rule: RuleConfig, paths: Sequence[int] = (0, 1, 2, 3), **scores: Sequence[float]) -> SelectionSurvey:
+        release, digest = selected.release, release_digest(selected.release.manifest)
+        index = release.index.columns(INDEX_COLUMNS)
+        train = np.flatnonzero(np.asarray(index["split"].to_pylist()) == "train")
+        columns = {name: np.full(len(index), np.nan) for name in scores}
+        for name, values in scores.items():
+            columns[name][train] = values
+        infos = tuple(
+            ScorerInfo(name=name, unit="ratio", direction=Direction.HIGHER, summary="invented", absent="none")
+            for name in scores
+        )
+        table = ScoreTable(
+            release_digest=digest, scorers=infos, keys=pa.array(index["key"].to_pylist()), columns=columns
+        )
+        xy_m = np.zeros((len(index), PATH_POINTS, 2), np.float32)
+        xy_m[train] += 10 * np.array(paths, np.float32)[:, None, None]
+        outlines = Outlines(xy_m=xy_m, floor_z_m=np.zeros(len(index), np.float32))
+        write_scores(tmp_path / "scores.parquet", table, outlines)
+        # the four clips are of one physical scene, so that paths of one number are near
+        alike = index.set_column(
+            index.column_names.index("physical_scene"), "physical_scene", pa.array(["s"] * len(index))
+        )
+        config = SelectionConfig(fraction=0.5, rule=rule)
+        chosen = select_clips(alike, table, outlines.take, config)
+        selection = replace(
+            selected.selection,
+            name="tried",
+            rule={**selected.selection.rule, "settings": {"name": "tried", **settings_of(config)}},
+            keys=table.keys.take(pa.array(chosen.rows)),
+            scores=chosen.difficulty,
+            why=chosen.why,
+        )
+        write_selection(tmp_path / "tried.parquet", selection)
+        shown = SelectionSurveyConfig(hardest=1, borderline=1, pictures=2, samples=0)
+        names = (str(tmp_path / "tried.parquet"), str(tmp_path / "scores.parquet"))
+        return survey_selection(release, *names, CODEC, shown)
+
+    return make

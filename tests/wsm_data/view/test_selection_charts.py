@@ -36,6 +36,11 @@ def test_what_lies_beyond_the_axis_is_said_of_both():
     assert text.endswith("50 % of chosen")
 
 
+def test_where_no_chosen_clip_has_the_score_only_the_share_of_all_is_said():
+    figure = compared_histogram(np.concatenate([np.linspace(0, 1, 998), [50, 60]]), np.empty(0), "x", share=False)
+    assert figure.axes[0].get_title(loc="right") == "beyond: 0.4 % of all"
+
+
 def test_few_clips_are_all_on_the_axis():
     figure = compared_histogram(np.arange(10.0), np.array([9.0]), "x", share=True)
     assert figure.axes[0].get_title(loc="right") == ""

@@ -2,6 +2,7 @@ import re
 
 import pytest
 
+from wsm_data.curation.rule import RuleConfig, RuleKind
 from wsm_data.shards.manifest import release_digest
 from wsm_data.view.selection_report import selection_html, write_selection_report
 from wsm_data.view.selection_survey import SelectionSurveyConfig, survey_selection
@@ -53,6 +54,18 @@ def test_overlaps_and_quotas_are_shown(html):
     text = text_of(html)
     for words in ("other 1 1 0.500", "the same rule under bootstrap", "By camera", "not chosen"):
         assert words in text
+
+
+def test_a_lexicographic_rule_is_told_in_its_own_words_and_order(survey_of, selected):
+    rule = RuleConfig(kind=RuleKind.LEXICOGRAPHIC, order=("cost", "unsafe"))
+    text = text_of(selection_html(selected.release, survey_of(rule, unsafe=[0.1, 0.9, 0.5, 0.2], cost=[5, 5, 5, 1])))
+    assert "tells each chosen clip from the first one that was left out" in text
+    assert "weighted share" not in text
+    assert text.index("cost higher is harder 1.") < text.index("unsafe higher is harder 2.")
+
+
+def test_what_stands_at_the_border_is_said(html):
+    assert "the hardest that were not, of those no harder than the easiest chosen one" in text_of(html)
 
 
 def test_hostile_text_is_text(html):

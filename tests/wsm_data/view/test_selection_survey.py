@@ -1,7 +1,9 @@
 import numpy as np
+import pyarrow as pa
 import pytest
 
-from wsm_data.curation.select import SelectionConfig
+from wsm_data.curation.key_order import key_hashes
+from wsm_data.curation.rule import RuleConfig, RuleKind
 from wsm_data.errors import ConfigError
 from wsm_data.shards.selection import selection_path, write_selection
 from wsm_data.view.selection_survey import SelectionSurveyConfig, selection_settings, survey_selection
@@ -71,6 +73,26 @@ def test_a_selection_of_another_release_is_refused(selected, made, tmp_path):
         survey_selection(other, "hard", selected.scores, made.codec, SHOWN)
 
 
-def test_defaults_build(selected):
-    assert SelectionConfig() != selected.config
-    assert np.isfinite(SelectionSurveyConfig().samples)
+def test_at_the_border_stand_the_last_that_was_chosen_and_the_first_that_is_no_harder(survey_of, selected):
+    """The second clip is a near-duplicate of the first: it is harder than the last one that was chosen."""
+    survey = survey_of(RuleConfig(weights={"detour_ratio": 1.0}), paths=(0, 0, 1, 2), detour_ratio=[4, 3, 2, 1])
+    index = selected.release.index.columns(["key", "split"])
+    train = [row["key"] for row in index.to_pylist() if row["split"] == "train"]
+    assert survey.selection.keys.to_pylist() == [train[0], train[2]]
+    assert [(one.rank, one.clip.meta.key) for one in survey.borderline] == [(2, train[2]), (None, train[3])]
+
+
+def test_clips_as_hard_as_the_easiest_chosen_one_are_left_out_in_the_order_of_the_walk(survey_of, selected):
+    survey = survey_of(RuleConfig(weights={"detour_ratio": 1.0}), detour_ratio=[1, 1, 1, 1])
+    index = selected.release.index.columns(["key", "split"])
+    train = [row["key"] for row in index.to_pylist() if row["split"] == "train"]
+    walk = [train[number] for number in np.argsort(key_hashes(pa.array(train)))]
+    assert survey.selection.keys.to_pylist() == walk[:2]
+    assert [one.clip.meta.key for one in survey.borderline] == [walk[1], walk[2]]
+
+
+def test_scores_of_a_lexicographic_rule_stand_in_its_order_and_lead_by_what_told_clips_apart(survey_of):
+    """All but the last clip cost the same: both chosen ones are told from the third by how unsafe they are."""
+    rule = RuleConfig(kind=RuleKind.LEXICOGRAPHIC, order=("cost", "unsafe"))
+    survey = survey_of(rule, unsafe=[0.1, 0.9, 0.5, 0.2], cost=[5, 5, 5, 1])
+    assert [(one.info.name, one.leads) for one in survey.scores] == [("cost", 0), ("unsafe", 2)]
