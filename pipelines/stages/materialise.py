@@ -32,7 +32,8 @@ class MaterialiseConfig:
 
 def _open(config: MaterialiseConfig) -> tuple[Release, Selection]:
     release = open_release(config.release)
-    return release, read_selection(release.store, config.selection, release_digest(release.manifest))
+    digest = release_digest(release.manifest)
+    return release, read_selection(release.store, config.selection, digest, release.index)
 
 
 def _list_units(config: MaterialiseConfig) -> Sequence[Unit]:

@@ -12,11 +12,11 @@ import pyarrow as pa
 import xxhash
 
 from pipelines.command_text import command_text
-from pipelines.config import settings_of
+from pipelines.config import differences, settings_of
 from pipelines.stage import Outcome, Stage, StageContext, Unit
 from wsm_data.curation.scores_table import ScoreTable, read_paths, read_scorers, read_scores
 from wsm_data.curation.select import INDEX_COLUMNS, ChosenClips, SelectionConfig, select_clips
-from wsm_data.errors import ConfigError
+from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.files.atomic import write_bytes
 from wsm_data.files.digest import sha256_file
 from wsm_data.files.stores import open_store
@@ -27,6 +27,7 @@ from wsm_data.shards.release import Release, open_release, read_manifest
 from wsm_data.shards.selection import (
     SELECTION_SUFFIX,
     Selection,
+    parse_selection,
     require_selection_name,
     selection_path,
     write_selection,
@@ -79,7 +80,6 @@ def _process(batch: Sequence[Unit], config: SelectConfig, context: StageContext)
         chosen = select_clips(index, scores, partial(read_paths, config.scores_location), config)
         path = context.out / config.file_name
         write_selection(path, _selection(config, scores, index, chosen, unit.inputs["scores"]))
-        install_selection(path, config)
         facts = {
             "clips chosen": len(chosen.rows),
             "of trajectories": chosen.trajectories,
@@ -100,17 +100,34 @@ def _needed_scores(release: Release, config: SelectConfig, keys: pa.ChunkedArray
 
 
 def install_selection(path: Path, config: SelectConfig) -> None:
-    """Put the selection into its release, where loaders find it by its name; nothing is done behind a URL."""
+    """Put the selection into its release, where loaders find it by its name; nothing is done behind a URL.
+
+    Where one of other settings stands there under its name, it is replaced, and that is announced.
+    """
     if "://" in config.release:
         _LOG.warning("%s is not copied to %s: put it at %s there", path, config.release, selection_path(config.name))
         return
     data, installed = path.read_bytes(), Path(config.release) / selection_path(config.name)
-    if installed.is_file() and installed.read_bytes() == data:
-        return
+    if installed.is_file():
+        old = installed.read_bytes()
+        if old == data:
+            return
+        _announce_replacement(installed, old, data)
     try:
         write_bytes(installed, data)
     except PermissionError as error:
         _LOG.warning("%s cannot be copied into its release (%s); name it by its path", path, error)
+
+
+def _announce_replacement(installed: Path, old: bytes, new: bytes) -> None:
+    try:
+        before = parse_selection(old, str(installed)).rule.get("settings", {})
+    except IntegrityError as error:
+        _LOG.warning("%s is replaced: %s", installed, error)
+        return
+    changes = differences(before, parse_selection(new, str(installed)).rule.get("settings", {}))
+    if changes:
+        _LOG.warning("%s is replaced by a selection with other settings: %s", installed, "; ".join(changes))
 
 
 def _selection(
@@ -121,11 +138,17 @@ def _selection(
         name=config.name,
         release_digest=scores.release_digest,
         rule=_rule(config, scores, chosen, scores_digest),
-        command=command_text("wsm select RELEASE", config, SelectConfig(release=config.release)),
+        command=_command(config),
         keys=pa.concat_arrays(keys.chunks),
         scores=chosen.difficulty,
         why=chosen.why,
     )
+
+
+def _command(config: SelectConfig) -> str:
+    """The command that was run; RELEASE and SCORES stand for where these lie, which is no part of a selection."""
+    text = command_text("wsm select RELEASE", config, SelectConfig(release=config.release))
+    return f"{text} --set scores=SCORES" if config.scores else text
 
 
 def _rule(config: SelectConfig, scores: ScoreTable, chosen: ChosenClips, scores_digest: str) -> dict[str, Any]:
@@ -160,4 +183,4 @@ def _scores_digest(location: str) -> str:
     return str(digest.hexdigest())
 
 
-STAGE = Stage(name="select", version=1, config_type=SelectConfig, list_units=_list_units, process=_process)
+STAGE = Stage(name="select", version=2, config_type=SelectConfig, list_units=_list_units, process=_process)

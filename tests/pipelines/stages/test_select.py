@@ -3,6 +3,7 @@ import shutil
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 import pytest
 
@@ -11,12 +12,14 @@ from pipelines.registry import load_stage
 from pipelines.runner import RunOptions, run_stage
 from pipelines.stages.score import ScoreConfig
 from pipelines.stages.select import SelectConfig, install_selection
-from wsm_data.curation.rule import RuleConfig
+from wsm_data.curation.exclusion import ExclusionConfig
+from wsm_data.curation.rollouts import rollout_schema
+from wsm_data.curation.rule import RuleConfig, RuleKind
 from wsm_data.errors import ConfigError
 from wsm_data.files.typed_toml import build_config
 from wsm_data.shards.manifest import release_digest
 from wsm_data.shards.release import open_release
-from wsm_data.shards.selection import read_selection
+from wsm_data.shards.selection import parse_selection, read_selection
 
 QUIET = RunOptions(quiet=True)
 
@@ -40,7 +43,9 @@ def select(release, tmp_path):
     def go(out="select", options=QUIET, **changes):
         config = SelectConfig(**{"release": str(release), "fraction": 0.5, **changes})
         report = run_stage(load_stage("select"), config, tmp_path / out, options)
-        return report, tmp_path / out / config.file_name
+        path = tmp_path / out / config.file_name
+        install_selection(path, config)  # as the command does
+        return report, path
 
     return go
 
@@ -65,10 +70,62 @@ def test_the_command_in_the_file_makes_the_same_bytes(select, release, tmp_path)
     assert (tmp_path / "again" / "long.parquet").read_bytes() == path.read_bytes()
 
 
-def test_another_number_of_workers_writes_the_same_bytes(select):
-    _, one = select(out="one")
-    _, two = select(out="two", options=RunOptions(quiet=True, workers=2))
-    assert one.read_bytes() == two.read_bytes()
+def test_scored_and_selected_with_any_number_of_workers_the_bytes_are_the_same(select, release, tmp_path):
+    found = []
+    for workers in (1, 2):
+        options, out = RunOptions(quiet=True, workers=workers), tmp_path / f"score{workers}"
+        report = run_stage(load_stage("score"), ScoreConfig(release=str(release), install=False), out, options)
+        assert len(report.ran) == 2  # as many shards, so that two workers share them
+        found.append(select(f"select{workers}", options, scores=str(out / "scores.parquet"))[1].read_bytes())
+    assert found[0] == found[1]
+
+
+def test_the_command_says_that_other_scores_were_named_and_not_where_they_lie(select, release, tmp_path):
+    scores = shutil.copy(release / "scores.parquet", tmp_path / "elsewhere.parquet")
+    _, path = select(scores=str(scores))
+    assert parse_selection(path.read_bytes(), "here").command == (
+        "wsm select RELEASE --set fraction=0.5 --set scores=SCORES"
+    )
+
+
+def test_a_rule_by_rollouts_that_were_never_made_says_to_evaluate_a_policy_first(select):
+    with pytest.raises(ConfigError, match=r"'rollout_unsafe_share' \(from rollouts: evaluate a policy first\)"):
+        select(rule=RuleConfig(kind=RuleKind.LEXICOGRAPHIC))
+
+
+def test_with_few_rollouts_the_others_are_left_out_where_that_is_asked_for(select, release, tmp_path):
+    opened = open_release(release)
+    train = opened.index.columns(["key"]).filter(pc.equal(opened.index.columns(["split"])["split"], "train"))
+    row = {"replan_latent": 0, "policy": "a", "dreams": 4, "unsafe_share": 0.5, "mean_cost_m2": 1.0, "ate_m": 0.1}
+    records = [{"key": train["key"][0].as_py(), **row, "fm_loss": 2.0}]
+    schema = rollout_schema(release_digest(opened.manifest))
+    pq.write_table(pa.Table.from_pylist(records, schema=schema), tmp_path / "rollouts.parquet")
+    config = ScoreConfig(release=str(release), rollouts=str(tmp_path / "rollouts.parquet"))
+    run_stage(load_stage("score"), config, tmp_path / "score", QUIET)
+    rule = RuleConfig(kind=RuleKind.LEXICOGRAPHIC)
+    with pytest.raises(ConfigError, match=r"clips have none of the scores of the rule .*exclude\.unscored=true"):
+        select(rule=rule, fraction=0.01)
+    _, path = select(out="some", rule=rule, fraction=0.01, exclude=ExclusionConfig(unscored=True))
+    found = parse_selection(path.read_bytes(), "here")
+    assert found.keys.to_pylist() == [records[0]["key"]]
+    assert found.rule["clips"]["excluded"]["having no score of the rule"] == len(train) - 1
+
+
+def test_a_selection_of_the_same_name_and_other_settings_is_replaced_aloud(select, release, caplog):
+    select()
+    select()
+    assert caplog.text == ""
+    _, path = select(out="other", fraction=0.25)
+    assert "is replaced by a selection with other settings: fraction: 0.5 -> 0.25" in caplog.text
+    assert (release / "selections" / "hard.parquet").read_bytes() == path.read_bytes()
+
+
+def test_what_is_no_selection_is_replaced_aloud(select, release, caplog):
+    (release / "selections").mkdir(exist_ok=True)
+    (release / "selections" / "hard.parquet").write_bytes(b"torn")
+    _, path = select()
+    assert "must be a selection" in caplog.text
+    assert (release / "selections" / "hard.parquet").read_bytes() == path.read_bytes()
 
 
 def test_the_place_of_the_release_does_not_show(select, release, tmp_path):
