@@ -37,10 +37,15 @@ def test_findings_that_are_mild_enough_end_with_code_0(audit):
     assert audit("--fail-on", "never")[0] == 0
 
 
-def test_a_shared_scene_fails_where_scenes_were_promised(tiny, tmp_path):
-    tiny.pack(tmp_path / "shared", tiny.clips[:1] + tiny.clips[-1:], shard_bytes=1 << 30)
-    run = CliRunner().invoke
-    assert run(app, ["audit", str(tmp_path / "shared"), "-q", "--split-by", "scene"]).exit_code == 0
+def test_a_shared_scene_fails_where_scenes_were_promised(audit, tiny, make_clip, tmp_path):
+    trained, held_out = make_clip("synth_d435i/home_0003/000050"), tiny.clips[-1]  # of one physical scene
+    tiny.pack(tmp_path / "shared", [trained, held_out], shard_bytes=1 << 30)
+    assert audit(folder="shared")[0] == 0
+    code, output = audit("--split-by", "scene", folder="shared")
+    assert code == 4
+    assert "has clips in several splits: 1 in test, 1 in train" in output
+    tiny.pack(tmp_path / "apart", [tiny.clips[0], held_out], shard_bytes=1 << 30)
+    assert audit("--split-by", "scene", folder="apart")[0] == 0
 
 
 def test_json_lists_every_finding(audit, tiny, tmp_path):
@@ -53,10 +58,12 @@ def test_json_lists_every_finding(audit, tiny, tmp_path):
     assert record["release_digest"] != release_digest(tiny.manifest)
 
 
-def test_severities_to_fail_on_are_those_of_findings(audit):
+def test_severities_to_fail_on_are_those_of_findings(audit, tiny, make_clip, tmp_path):
     assert {one.value for one in FailOn} == {one.value for one in Severity} | {"never"}
-    codes = [audit("--fail-on", one.value)[0] for one in (FailOn.INFO, FailOn.WARNING, FailOn.ERROR)]
-    assert codes == [4, 4, 4]
+    clips = [tiny.clips[0], make_clip("synth_d435i/home_0001/000050", map_digest="another map")]  # a warning alone
+    tiny.pack(tmp_path / "mild", clips, shard_bytes=1 << 30)
+    fail_on = (FailOn.INFO, FailOn.WARNING, FailOn.ERROR, FailOn.NEVER)
+    assert [audit("--fail-on", one.value, folder="mild")[0] for one in fail_on] == [4, 4, 0, 0]
 
 
 def test_a_distance_below_0_is_refused_by_its_option(audit):
