@@ -62,6 +62,7 @@ class CachedShards:
         self._downloads = 0
         self._downloaded_bytes = self._read_bytes = 0
         self._has_warned = False
+        self._unreachable: set[str] = set()
         self._ahead = [
             threading.Thread(target=self._fetch_ahead, name=f"wsm-ahead-{number}", daemon=True)
             for number in range(_DOWNLOADS_AHEAD)
@@ -198,6 +199,10 @@ class CachedShards:
                     self._download(shard, begun)
         except (WsmError, OSError) as error:
             if not self._closed.is_set():
-                _LOGGER.warning(
-                    "%s could not be fetched in advance, and will be tried when it is read: %s", shard, error
-                )
+                self._warn_once(shard.name, error)
+
+    def _warn_once(self, name: str, error: Exception) -> None:
+        if name not in self._unreachable:
+            self._unreachable.add(name)
+            place = f"{self._store.root}/{name}"
+            _LOGGER.warning("%s could not be fetched in advance, and will be tried when it is read: %s", place, error)

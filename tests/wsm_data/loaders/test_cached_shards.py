@@ -137,6 +137,21 @@ def test_faults_that_pass_change_nothing(open_reader, published, remote, faults)
     assert remote.proxy.spoiled() == len(faults)
 
 
+def test_a_shard_that_cannot_be_fetched_in_advance_is_named_once(
+    open_reader, published, remote, address, monkeypatch, caplog
+):
+    monkeypatch.setattr("wsm_data.loaders.cached_shards._RETRY_S", 0.01)
+    monkeypatch.setattr("wsm_data.loaders.cached_shards._IDLE_S", 0.01)
+    bad = shards_of(published)[0]
+    remote.proxy.spoil(bad, Fault.RESET, FOREVER)
+    reader = open_reader(attempts=1)
+    reader.expect(first_spans(published))
+    wait_for(lambda: len(remote.proxy.requests(bad)) >= 3)
+    reader.close()
+    said = [record.getMessage() for record in caplog.records if "in advance" in record.getMessage()]
+    assert [message.partition(" ")[0] for message in said] == [f"{address}/{bad}"]
+
+
 def test_a_store_that_fails_for_good_is_an_error_that_names_the_shard(open_reader, published, remote, address):
     reader = open_reader(attempts=2)
     bad = shards_of(published)[1]
