@@ -44,15 +44,14 @@ class Announcements(Generic[Value]):
                 return span, value
         return None
 
-    def remove(self, span: Span) -> bool:
-        """Strike a stretch, because it was read; whether it was announced."""
+    def remove(self, span: Span) -> None:
+        """Strike a stretch, because it was read; nothing where it is not announced, or was given up."""
         number = self._numbers.get(span)
         if number is None:
-            return False
+            return
         outdated = takewhile(lambda other: self._numbers[other] < number - _OUTDATED, self._numbers)
         for old in [span, *outdated]:
             self._drop(old)
-        return True
 
     def _drop(self, span: Span) -> None:
         del self._numbers[span]

@@ -31,7 +31,6 @@ class EpochAudit:
         steps: steps the whole epoch has.
         recorded: steps that were recorded by all ranks.
         delivered: clips of those steps, one that came twice counted twice.
-        planned: clips the sources give to the epoch.
         seen_once: clips that were seen once.
         seen_more: clips that were seen more often.
         never: clips of the sources that were not seen.
@@ -43,7 +42,6 @@ class EpochAudit:
     steps: int
     recorded: int
     delivered: int
-    planned: int
     seen_once: int
     seen_more: int
     never: int
@@ -128,7 +126,6 @@ def _audit_epoch(
         steps=record.steps,
         recorded=record.recorded,
         delivered=len(refs),
-        planned=sum(len(range(*_stretch(source, record.epoch))) for source in stated),
         seen_once=int((times == 1).sum()),
         seen_more=int((times > 1).sum()),
         never=int((times == 0).sum()),

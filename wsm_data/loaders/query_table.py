@@ -52,11 +52,9 @@ class QuerySources(Sources):
 
     Attributes:
         queries: the settings.
-        clips_without: clips that are too short for any query.
     """
 
     queries: QueryConfig
-    clips_without: int
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Cross to another process as settings."""
@@ -113,7 +111,7 @@ def open_queries(configs: Sequence[SourceConfig], queries: QueryConfig) -> Query
         tables.append(replace(table, rows=np.repeat(table.rows, counts), base=base))
     if without:
         _LOG.warning("%d of %d clips are too short for a query and are left out", without, clips.clips)
-    return QuerySources(tuple(tables), clips.duplicates, queries, without)
+    return QuerySources(tuple(tables), clips.duplicates, queries)
 
 
 def replan_choices(table: SourceTable, queries: QueryConfig) -> Int64Array:
