@@ -18,7 +18,7 @@ class Setting:
         folder: what `write` has written.
         shuffle: in the loader's own shuffled order, or in that of the files.
         workers: worker processes of a torch DataLoader; 0: the loader's own way in one process.
-        options: knobs of the contestant, by name.
+        options: settings of the contestant, by name; the peers have none beside what their modules set.
     """
 
     folder: Path

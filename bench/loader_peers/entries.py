@@ -1,4 +1,4 @@
-"""Who takes part in which comparison, with the settings that were best here."""
+"""Who takes part in which comparison, and with which settings."""
 
 from dataclasses import dataclass, field
 
@@ -13,7 +13,7 @@ class Entry:
     Attributes:
         module: the contestant, a module beside this one.
         environment: name of its environment; empty for this project's own.
-        options: its settings.
+        options: settings of the limits and of our own loader; the modules of the peers hold theirs.
         workers: worker processes where the comparison is that of a DataLoader with two; None: takes no part in it.
         only_processes: takes part in that comparison alone.
         shuffled: takes part where clips are shuffled.

@@ -62,12 +62,12 @@ class Opened:
             batch_size=BATCH,
             shuffle_buffer_size=SHUFFLED_CLIPS if setting.shuffle else None,
             shuffle_over_epochs_multiplier=1 if setting.shuffle else None,
-            max_samples_per_sequence=setting.options.get("max_samples_per_sequence"),
+            max_samples_per_sequence=None,  # it has no default
             task_encoder=Encoder(),
             repeat=False,
             parallel_shard_iters=None if setting.shuffle else 1,
         )
-        self._loader = get_savable_loader(dataset, **setting.options.get("loader", {}))
+        self._loader = get_savable_loader(dataset)
 
     def epoch(self) -> Iterator[Batch]:
         return iter(self._loader)

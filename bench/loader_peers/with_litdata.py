@@ -26,9 +26,7 @@ class Opened:
     """Its dataset in its DataLoader."""
 
     def __init__(self, setting: Setting):
-        dataset = StreamingDataset(
-            str(setting.folder), shuffle=setting.shuffle, seed=SEED, **setting.options.get("dataset", {})
-        )
+        dataset = StreamingDataset(str(setting.folder), shuffle=setting.shuffle, seed=SEED)
         workers = {"persistent_workers": True, "prefetch_factor": 2} if setting.workers else {}
         self._loader = StreamingDataLoader(dataset, batch_size=BATCH, num_workers=setting.workers, **workers)
 

@@ -38,7 +38,6 @@ class Opened:
             shuffle=setting.shuffle,
             shuffle_seed=SEED,
             batch_size=BATCH,
-            **setting.options.get("dataset", {}),
         )
         workers = {"persistent_workers": True, "prefetch_factor": 2} if setting.workers else {}
         self._loader = StreamingDataLoader(
