@@ -8,7 +8,9 @@ was, on as many ranks as are there now. Nothing is pickled.
 import json
 import re
 import shutil
-from collections.abc import Mapping
+import warnings
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -57,7 +59,8 @@ def save_checkpoint(folder: Path, model: nn.Module, optimiser: torch.optim.Optim
         path.mkdir(parents=True)
     wait_for_all()
     writer = HuggingFaceStorageWriter(str(path), save_distributed=True)
-    save(_tensors(model, optimiser), storage_writer=writer, no_dist=world_size == 1)
+    with _quiet_alone():
+        save(_tensors(model, optimiser), storage_writer=writer, no_dist=world_size == 1)
     wait_for_all()
     if rank == 0:
         record = {"step": state.step, "loader": dict(state.loader), "identity": dict(state.identity)}
@@ -81,7 +84,8 @@ def load_checkpoint(
     _, world_size = rank_and_world_size()
     try:
         reader = HuggingFaceStorageReader(str(path))
-        load(_tensors(model, optimiser), storage_reader=reader, no_dist=world_size == 1)
+        with _quiet_alone():
+            load(_tensors(model, optimiser), storage_reader=reader, no_dist=world_size == 1)
     except (OSError, RuntimeError, KeyError, ValueError, CheckpointException) as error:
         raise IntegrityError(
             f"{path} must be a whole checkpoint, but: {error}; delete it to go on from the one before"
@@ -113,6 +117,14 @@ def drop_old_checkpoints(folder: Path, keep: int) -> None:
     for path in checkpoints(folder)[:-keep]:
         (path / _STATE).unlink()
         shutil.rmtree(path)
+
+
+@contextmanager
+def _quiet_alone() -> Iterator[None]:
+    """Without a word about a single process, which is asked for."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="torch.distributed is disabled", category=UserWarning)
+        yield
 
 
 def _tensors(model: nn.Module, optimiser: torch.optim.Optimizer) -> dict[str, Tensor]:

@@ -1,0 +1,146 @@
+"""wsm train, from a release to a model, in one process and in two."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import torch
+from typer.testing import CliRunner
+
+from pipelines.cli import app
+from wsm_model.model_file import load_model
+from wsm_model.training.checkpoint import checkpoints
+
+torch.set_num_threads(1)
+
+SETTINGS = """
+[order]
+global_batch = 2
+max_latents = 4
+
+[training]
+max_steps = 3
+precision = "float32"
+checkpoint_every = 2
+sample_every = 2
+
+[training.optimiser]
+learning_rate = 1e-3
+final_learning_rate = 1e-4
+
+[held_out]
+clips = 1
+max_latents = 6
+"""
+
+
+@pytest.fixture(scope="module")
+def release(make_source, run_pipeline, tmp_path_factory) -> str:
+    """A small release of generated homes."""
+    out = tmp_path_factory.mktemp("run")
+    run_pipeline(make_source(scenes=2, trajectories=3), out)
+    return str(out / "pack" / "release")
+
+
+@pytest.fixture
+def settings(tmp_path) -> str:
+    path = tmp_path / "train.toml"
+    path.write_text(SETTINGS)
+    return str(path)
+
+
+def wsm(*words: str) -> tuple[int, str]:
+    """Exit code and output of a command in this process."""
+    done = CliRunner().invoke(app, list(words))
+    return done.exit_code, done.output
+
+
+def test_a_run_leaves_model_metrics_pictures_ledger_and_evaluation(release, settings, tmp_path):
+    out = tmp_path / "run"
+    code, text = wsm("train", release, "--out", str(out), "-c", settings, "--quiet")
+    assert code == 0, text
+    assert "camera ATE, not aligned (m)" in text
+    metrics = [json.loads(line) for line in (out / "metrics.jsonl").read_text().splitlines()]
+    assert [line["step"] for line in metrics] == [1, 2, 3]
+    assert {"loss", "flow", "depth", "pose_absolute", "pose_relative", "gradient_norm"} <= set(metrics[0])
+    assert (out / "samples" / "step-000002.png").stat().st_size > 10_000
+    assert (out / "curves.png").exists()
+    assert list((out / "tensorboard").iterdir())
+    evaluation = json.loads((out / "evaluation.json").read_text())
+    assert set(evaluation["flow"]) == {"model", "copy", "unconditional"}
+    _, card = load_model(out / "model")
+    assert card.steps == 3
+    audited, said = wsm("audit-run", str(out / "ledger"), "--release", release)
+    assert audited == 0, said
+
+
+def test_the_same_command_again_trains_no_step_more(release, settings, tmp_path):
+    out = tmp_path / "run"
+    for _ in range(2):
+        code, text = wsm("train", release, "--out", str(out), "-c", settings, "--quiet")
+        assert code == 0, text
+    assert [json.loads(line)["step"] for line in (out / "metrics.jsonl").read_text().splitlines()] == [1, 2, 3]
+    assert [path.name for path in checkpoints(out / "checkpoints")] == ["step-000002", "step-000003"]
+
+
+def test_other_settings_in_the_same_folder_are_refused(release, settings, tmp_path):
+    out = tmp_path / "run"
+    wsm("train", release, "--out", str(out), "-c", settings, "--quiet")
+    code, text = wsm("train", release, "--out", str(out), "-c", settings, "-s", "training.seed=5", "--quiet")
+    assert code == 2
+    assert "training.seed: 0 in the checkpoint, 5 now" in text
+
+
+def test_a_dry_run_says_sizes_and_writes_nothing(release, settings, tmp_path):
+    out = tmp_path / "run"
+    code, text = wsm("train", release, "--out", str(out), "-c", settings, "--dry-run")
+    assert code == 0, text
+    assert "steps: 3" in text
+    assert "model: tiny, 6 layers" in text
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ((), "must know what to train on"),
+        (("RELEASE", "-s", "model.size=tinny"), "did you mean tiny"),
+        (("RELEASE", "-s", "order.global_batch=1000"), "do not fill a global batch"),
+        (("RELEASE", "-s", "training.maxsteps=3"), "unknown key training.maxsteps"),
+        (("RELEASE", "-s", "model.weights=nowhere", "-s", "order.global_batch=2"), "must hold diffusion_pytorch_model"),
+    ],
+)
+def test_a_wrong_request_ends_with_code_2_before_any_step(release, tmp_path, words, message):
+    given = [release if word == "RELEASE" else word for word in words]
+    code, text = wsm("train", *given, "--out", str(tmp_path / "run"), "--quiet", "-s", "training.max_steps=1")
+    assert code == 2, text
+    assert message in text
+
+
+@pytest.mark.slow
+def test_two_processes_train_the_model_that_one_trains(release, settings, tmp_path):
+    """FSDP2 over gloo; pictures are drawn by both. Equal to the rounding of float32 in three steps."""
+    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+    command = [
+        sys.executable,
+        "-m",
+        "torch.distributed.run",
+        "--standalone",
+        "--nproc-per-node",
+        "2",
+        "-m",
+        "pipelines.cli",
+    ]
+    words = ["train", release, "-c", settings, "--quiet", "--out"]
+    two = [*command, *words, str(tmp_path / "two")]
+    done = subprocess.run(two, env=environment, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    code, text = wsm(*words, str(tmp_path / "one"))
+    assert code == 0, text
+    models = [load_model(Path(tmp_path / name) / "model")[0] for name in ("one", "two")]
+    for first, second in zip(*(model.parameters() for model in models), strict=True):
+        torch.testing.assert_close(second, first, rtol=0, atol=1e-5)
+    assert (tmp_path / "two" / "samples" / "step-000002.png").exists()
