@@ -200,7 +200,7 @@ def _open_source(config: SourceConfig, release: Release, base: int) -> SourceTab
     is_chosen = _is_of_split(config, release)
     rows, selection = np.flatnonzero(is_chosen), ""
     if config.selection:
-        chosen = read_selection(release.store, config.selection, release.digest)
+        chosen = read_selection(release.store, config.selection, release.digest, release.index)
         rows, selection = chosen.rows_of(release.index), chosen.name
         rows = rows[is_chosen[rows]]
     if not len(rows):
