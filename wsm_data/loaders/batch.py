@@ -17,7 +17,7 @@ from wsm_data.loaders.timing import Part
 from wsm_data.schema.clip import TEMPORAL_RATIO
 
 POSE_SLOTS = TEMPORAL_RATIO
-"""Pose slots of a latent: latent j >= 1 has those of its raw frames 4 j - 3 to 4 j, latent 0 the first pose in each."""
+"""Pose slots of a latent: latent j >= 1 has those of its raw frames 4 j - 3 to 4 j, latent 0 the identity in each."""
 
 LATENT_TENSORS = ("rgb", "depth")
 """Tensors of a batch that hold latents."""
