@@ -30,8 +30,8 @@ delivered them; what follows is compared, in order, with what that process deliv
 what was delivered is read again and thrown away."""
 
 KNOWN = """\
-Measured earlier, not in this run: the public loader of the raw set, InternNav's NavDP dataset, takes 0.2 to 2.9 s for
-an item (median 0.72 s)."""
+Not of this run: according to the notes that this project was begun with, the public loader of the raw set, InternNav's
+NavDP dataset, takes 0.2 to 2.9 s for an item (median 0.72 s). No script here measures it."""
 
 
 def page(record: Mapping[str, Any]) -> list[str]:
