@@ -1,9 +1,9 @@
-"""What the mask's structure and the cache are worth: training and planning steps against the length of a clip.
+"""What the structure of the mask and the cache are worth: training and planning steps against the length of a clip.
 
-Training: one step (forward, losses, backward) on one sequence, blocks of the mask against the dense matrix. Planning: one
-new latent observed, four dreamed in eight steps, their states estimated; with the cache of all that was seen before,
-against a new session that is given the whole history first. Layers and widths are cut down so that 128 latents fit a
-short run: the ratios are those of the structure. Run as `python bench/model.py`.
+Training: one step (forward, losses, backward) on one sequence, blocks of the mask against the dense matrix. Planning:
+one new latent observed, four dreamed in eight steps, their states estimated; with the cache of all that was seen
+before, against a new session that is given the whole history first. Layers and widths are cut down so that 128
+latents fit a short run: the ratios are those of the structure. Run as `python bench/model.py`.
 """
 
 import json
