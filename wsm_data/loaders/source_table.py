@@ -9,9 +9,11 @@ from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 
 from wsm_data.errors import ConfigError
 from wsm_data.files.digest import sha256_bytes
@@ -251,7 +253,7 @@ def count_duplicates(tables: Sequence[SourceTable]) -> int:
 def _shared(one: SourceTable, other: SourceTable) -> tuple[int, str]:
     """How many clips two sources share, and the key of the first in the order of `one`.
 
-    Hashes are compared first, so that of sources of any size only the texts of few clips are held.
+    Hashes are compared first, so that of sources of any size only the texts of some clips are held.
     """
     if one.release.digest == other.release.digest:
         rows = np.intersect1d(one.rows, other.rows, assume_unique=True)
@@ -270,7 +272,8 @@ def _shared(one: SourceTable, other: SourceTable) -> tuple[int, str]:
 
 def _content_hashes(table: SourceTable) -> Int64Array:
     """A number for each clip, the same for the same content within this process; int64 [clips]."""
-    return np.fromiter(map(hash, _contents(table, np.arange(len(table)))), np.int64, len(table))
+    parts = (zip(*(column.to_pylist() for column in part), strict=True) for part in _content_parts(table))
+    return np.fromiter(map(hash, chain.from_iterable(parts)), np.int64, len(table.release.index))[table.rows]
 
 
 def _numbers_of(hashes: Int64Array, wanted: Int64Array) -> Int64Array:
@@ -281,12 +284,16 @@ def _numbers_of(hashes: Int64Array, wanted: Int64Array) -> Int64Array:
 
 def _contents(table: SourceTable, numbers: Int64Array) -> Iterator[tuple[str, str]]:
     """Key and digest of the content of some clips, ascending by number; the index is read part by part."""
-    rows, index, start = table.rows[numbers], table.release.index, 0
-    for keys, digests in zip(index.parts("key"), index.parts("source_digest"), strict=True):
+    rows, start = table.rows[numbers], 0
+    for keys, digests in _content_parts(table):
         first, last = np.searchsorted(rows, (start, start + len(keys)))
         own = rows[first:last] - start
         yield from zip(keys.take(own).to_pylist(), digests.take(own).to_pylist(), strict=True)
         start += len(keys)
+
+
+def _content_parts(table: SourceTable) -> Iterator[tuple[pa.ChunkedArray, pa.ChunkedArray]]:
+    return zip(table.release.index.parts("key"), table.release.index.parts("source_digest"), strict=True)
 
 
 def _words(table: SourceTable) -> str:

@@ -12,7 +12,7 @@ import pytest
 
 from wsm_data.errors import ConfigError
 from wsm_data.loaders.config import OrderConfig, SourceConfig
-from wsm_data.loaders.source_table import _contents, open_sources
+from wsm_data.loaders.source_table import open_sources
 from wsm_data.schema.clip import Clip
 from wsm_data.shards.manifest import manifest_bytes
 from wsm_data.shards.release import open_release
@@ -161,7 +161,7 @@ def test_clips_are_the_same_by_key_and_content_whatever_their_hashes(
     monkeypatch.setattr("wsm_data.loaders.source_table._COMPARED_AT_ONCE", at_once)
     monkeypatch.setattr(
         "wsm_data.loaders.source_table._content_hashes",
-        lambda table: np.array([hash(one) % hashes for one in _contents(table, np.arange(len(table)))], np.int64),
+        lambda table: np.array([hash(key) % hashes for key in table.keys(range(len(table)))], np.int64),
     )
     changed = [make_clip(clip.meta.id.text, latents=3, source_digest="another") for clip in tiny.clips[4:6]]
     tiny.pack(tiny.folder.with_name("other"), [*tiny.clips[1:4], *changed], shard_bytes=200_000)
