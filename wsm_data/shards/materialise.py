@@ -21,7 +21,7 @@ from wsm_data.shards.assemble import (
 from wsm_data.shards.index import IndexTable
 from wsm_data.shards.index_row import REPEATED_COLUMNS, SCHEMA
 from wsm_data.shards.inventory import UnitState
-from wsm_data.shards.manifest import ReleaseManifest, ShardInfo, release_digest
+from wsm_data.shards.manifest import ReleaseManifest, ShardInfo
 from wsm_data.shards.plan import PlannedClip, ShardPlan, plan_shards
 from wsm_data.shards.release import Release
 from wsm_data.shards.selection import Selection
@@ -63,8 +63,8 @@ def finish_selection(
 ) -> ReleaseManifest:
     """Write everything beside the shards of a selection, dataset.json last.
 
-    Statistics, codec, licences and names of sources are those of the release. What the release refused is not repeated:
-    the inventory is that of the chosen clips.
+    Statistics, codec, licences and names of sources are those of the release, and so is whether it is a partial one.
+    What the release refused is not repeated: the inventory is that of the chosen clips.
 
     Args:
         folder: where the shards are.
@@ -103,7 +103,8 @@ def _facts(release: Release, selection: Selection, fingerprints: Mapping[str, st
         fingerprints={**parent.fingerprints, **fingerprints},
         licences=parent.licences,
         codec_quality=parent.codec_quality,
-        parent=release_digest(parent),
+        parent=release.digest,
+        partial=parent.partial,
     )
 
 

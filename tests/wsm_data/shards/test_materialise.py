@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pyarrow as pa
 import pytest
@@ -25,8 +27,9 @@ def choose(release, rows):
 
 @pytest.fixture
 def materialise(tiny, tmp_path):
-    def go(rows=(3, 0, 2), shard_bytes=1 << 30, folder="own"):
+    def go(rows=(3, 0, 2), shard_bytes=1 << 30, folder="own", **changes):
         release = open_release(tiny.folder)
+        release = replace(release, manifest=replace(release.manifest, **changes))
         selection = choose(release, rows)
         plans = plan_selection(release, selection, shard_bytes)
         shards = [copy_shard(tmp_path / folder / plan.name, plan, release) for plan in plans]
@@ -53,6 +56,11 @@ def test_it_names_its_parent_and_is_standardised_as_its_parent(materialise, tiny
     assert own.fingerprints == {**parent.fingerprints, "selection": "5e1ec7"}
     for field in ("rgb_statistics", "depth_statistics", "codec", "licences", "depth_range", "codec_quality"):
         assert getattr(own, field) == getattr(parent, field)
+
+
+@pytest.mark.parametrize("partial", [False, True])
+def test_what_was_chosen_from_a_part_of_the_source_says_so(materialise, partial):
+    assert open_release(materialise(partial=partial)).manifest.partial is partial
 
 
 def test_its_inventory_is_that_of_the_chosen_clips(materialise):
