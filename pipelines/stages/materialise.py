@@ -8,7 +8,7 @@ from pipelines.stage import Finished, Outcome, Settled, Stage, StageContext, Uni
 from wsm_data.files.digest import digest_json, sha256_bytes
 from wsm_data.files.stores import open_store
 from wsm_data.files.typed_toml import INPUT
-from wsm_data.shards.manifest import ShardInfo, release_digest
+from wsm_data.shards.manifest import ShardInfo
 from wsm_data.shards.materialise import copy_shard, finish_selection, plan_selection
 from wsm_data.shards.names import INDEX_NAME, INVENTORY_NAME, MANIFEST_NAME, QUARANTINE_NAME
 from wsm_data.shards.release import Release, open_release
@@ -32,18 +32,16 @@ class MaterialiseConfig:
 
 def _open(config: MaterialiseConfig) -> tuple[Release, Selection]:
     release = open_release(config.release)
-    digest = release_digest(release.manifest)
-    return release, read_selection(release.store, config.selection, digest, release.index)
+    return release, read_selection(release.store, config.selection, release.digest, release.index)
 
 
 def _list_units(config: MaterialiseConfig) -> Sequence[Unit]:
     release, selection = _open(config)
     plans = plan_selection(release, selection, config.shard_mib << 20)
-    parent = release_digest(release.manifest)
     return [
         Unit(
             id=plan.name,
-            inputs={"parent": parent, "clips": digest_json([one.key for one in plan.clips])},
+            inputs={"parent": release.digest, "clips": digest_json([one.key for one in plan.clips])},
             payload=plan,
         )
         for plan in plans

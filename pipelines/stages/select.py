@@ -93,7 +93,7 @@ def _needed_scores(release: Release, config: SelectConfig, keys: pa.ChunkedArray
     """The scores that the settings name, of the clips with these keys."""
     return read_scores(
         config.scores_location,
-        release_digest=release_digest(release.manifest),
+        release_digest=release.digest,
         release_keys=keys,
         only=config.score_names(read_scorers(config.scores_location)),
     )

@@ -22,7 +22,6 @@ from wsm_data.errors import ConfigError
 from wsm_data.files.typed_toml import build_config
 from wsm_data.schema.arrays import Float64Array
 from wsm_data.schema.clip import Clip
-from wsm_data.shards.manifest import release_digest
 from wsm_data.shards.release import Release
 from wsm_data.shards.selection import Selection, read_selection, selection_names
 from wsm_data.view.clip_facts import moving_frames
@@ -152,7 +151,7 @@ def survey_selection(
         IntegrityError: a clip that is shown is damaged.
     """
     shown = shown or SelectionSurveyConfig()
-    digest = release_digest(release.manifest)
+    digest = release.digest
     selection = read_selection(release.store, name, digest, release.index)
     config = selection_settings(selection)
     scores = read_scores(scores_location, release_digest=digest, release_keys=release.index.columns(["key"])["key"])
