@@ -27,6 +27,7 @@ from planted_homes import KINDS, planted_pair
 from reporting import machine, machine_line, table, write_results
 
 from wsm_data.curation.path_outline import PATH_POINTS, Outlines
+from wsm_data.curation.quotas import column_codes
 from wsm_data.curation.rule import GEOMETRY_WEIGHTS
 from wsm_data.curation.score_clip import CLIP_SCORES, score_trajectory
 from wsm_data.curation.scorers.registry import GEOMETRY_SCORERS
@@ -43,6 +44,7 @@ SEED = 7
 SELECTED = {20_000: 5, 1_000_000: 3, 10_000_000: 2}  # clips: rounds
 GOAL_S, GOAL_GB = 30.0, 4.0
 SCENE_M, FLOORS, FLOOR_M = 12.0, 2, 2.8
+REPEATED_EVERY, BESIDE_M = 10, 0.05
 SELECT = (sys.executable, "-c", "from pipelines.cli import app; app()", "select")
 
 
@@ -118,10 +120,14 @@ def gigabytes(usage: resource.struct_rusage) -> float:
 
 
 def generate_scores(release: Path, clips: int) -> None:
-    """All scores of all clips, skewed as lengths and detours are, and paths with a bend on two floors of 12 m."""
+    """All scores of all clips, skewed as lengths and detours are, and paths with a bend on two floors of 12 m.
+
+    In every scene a tenth of the paths repeat another one of it, a few centimetres beside.
+    """
     rng = np.random.default_rng(clips)
     opened = open_release(release)
-    keys = opened.index.columns(["key"])["key"]
+    index = opened.index.columns(["key", "physical_scene"])
+    keys = index["key"]
     columns = {one.name: rng.gamma(2.0, 1.0, clips) for one in CLIP_SCORES}
     columns["goal_reachable"] = (rng.random(clips) > 0.001).astype(np.float64)
     scores = ScoreTable(
@@ -136,7 +142,11 @@ def generate_scores(release: Path, clips: int) -> None:
         count = len(range(clips)[rows])
         start, bend, end = (rng.uniform(0, SCENE_M, (count, 1, 2)).astype(np.float32) for _ in range(3))
         xy_m[rows] = np.where(along < 0.5, start + 2 * along * (bend - start), bend + (2 * along - 1) * (end - bend))
+    by_scene = np.argsort(column_codes(index["physical_scene"])[1], kind="stable")
+    first, again = by_scene[:-1:REPEATED_EVERY], by_scene[1::REPEATED_EVERY]
+    xy_m[again] = xy_m[first] + rng.normal(0, BESIDE_M, (len(first), 1, 2)).astype(np.float32)
     floor_z_m = (FLOOR_M * rng.integers(0, FLOORS, clips)).astype(np.float32)
+    floor_z_m[again] = floor_z_m[first]
     write_scores(release / SCORES_NAME, scores, Outlines(xy_m=xy_m, floor_z_m=floor_z_m))
 
 
