@@ -46,8 +46,9 @@ def compare(contest: Contest, names: list[str], rounds: int, **kind: bool) -> di
         for name in names[first:] + names[:first]:
             found = contest.running(name).ask("round")
             as_stored = ENTRIES[name].as_stored or name in LIMITS
-            require(name, found, {"clips": CLIPS} | ({"bytes": CLIPS * CLIP_BYTES} if as_stored else {}))
-            rates[name].append(CLIPS / found["seconds"])
+            clips = found["epochs"] * CLIPS
+            require(name, found, {"clips": clips} | ({"bytes": clips * CLIP_BYTES} if as_stored else {}))
+            rates[name].append(clips / found["seconds"])
     return rates
 
 

@@ -10,9 +10,9 @@ from loader_peers.entries import ENTRIES, LIMITS, OURS, PEERS
 
 INTRODUCTION = """\
 {clips} clips of {megabytes:.2f} MB in batches of {batch_clips}, as they are stored, page cache warm; medians of
-{rounds} interleaved rounds, with the lowest and the highest in brackets. A round is an epoch. Ratios are taken within a
-round, and say how much faster `wsm` is. Every array of every clip that a contestant delivers as stored was compared
-with what was written. torch has one thread in all of them."""
+{rounds} interleaved rounds, with the lowest and the highest in brackets. A round is as many epochs as
+fill a second. Ratios are taken within a round, and say how much faster `wsm` is. Every array of every clip that a
+contestant delivers as stored was compared with what was written. torch has one thread in all of them."""
 
 WORKERS = """\
 Workers are started before the first round and persist. `wsm` without a number of processes is the same loader in the
