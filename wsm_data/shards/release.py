@@ -22,7 +22,7 @@ from wsm_data.shards.inventory import InventoryRow, parse_inventory, parse_quara
 from wsm_data.shards.manifest import ReleaseManifest, parse_manifest
 from wsm_data.shards.names import INDEX_NAME, INVENTORY_NAME, MANIFEST_NAME, QUARANTINE_NAME
 
-_HASHED_AT_ONCE_BYTES = 8 << 20
+_HASHED_AT_ONCE_BYTES = 64 << 20
 _PLACES_IN_A_RUN = ("release", "pack/release")
 """Where a release lies in the folder of `wsm pack`, and in that of a run."""
 
