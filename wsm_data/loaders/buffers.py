@@ -5,10 +5,12 @@ of a batch goes back to a pool when the last tensor or array that looks at it is
 """
 
 import mmap
+import threading
+import time
 import weakref
+from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
-from queue import Empty, SimpleQueue
 
 import numpy as np
 import torch
@@ -46,7 +48,8 @@ class BufferPool:
         if pinned and not torch.cuda.is_available():
             raise ConfigError("pin_memory needs a CUDA device, and torch finds none; leave it out")
         self._allocate: Callable[[int], Memory] = _pinned_memory if pinned else _page_memory
-        self._free: SimpleQueue[Memory] = SimpleQueue()  # may be filled while this thread is about to take from it
+        self._free: deque[Memory] = deque()  # may be filled while this thread is about to take from it
+        self._came_back = threading.Lock()  # released when memory comes back, acquired by who waits for some
         self._blocks: set[int] = set()  # by id
         self._kept = self._enough = blocks
         self._block_bytes = 0
@@ -65,11 +68,17 @@ class BufferPool:
         return torch.from_numpy(lent)
 
     def _reused(self, size_bytes: int) -> Memory:
+        # Not a SimpleQueue: in CPython 3.11, `get(timeout=...)` in several threads may wait without end.
+        until_s = time.monotonic() + _PATIENCE_S
         while True:
             try:
-                memory = self._free.get(timeout=_PATIENCE_S if len(self._blocks) >= self._enough else 0)
-            except Empty:
-                return self._new()
+                memory = self._free.popleft()
+            except IndexError:
+                left_s = until_s - time.monotonic()
+                if len(self._blocks) < self._enough or left_s <= 0:
+                    return self._new()
+                self._came_back.acquire(timeout=left_s)
+                continue
             if len(memory) >= size_bytes:
                 return memory
             self._blocks.discard(id(memory))
@@ -83,7 +92,9 @@ class BufferPool:
 
     def _give_back(self, memory: Memory) -> None:
         if len(memory) == self._block_bytes and len(self._blocks) <= self._kept:
-            self._free.put(memory)
+            self._free.append(memory)
+            with suppress(RuntimeError):  # it is released already
+                self._came_back.release()
         else:
             self._blocks.discard(id(memory))
 

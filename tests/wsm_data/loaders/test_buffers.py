@@ -65,7 +65,7 @@ def test_memory_too_small_for_what_is_asked_is_let_go():
     large.fill_(2)
     del small, large
     assert pool.take(39 * MIB).numel() == 39 * MIB
-    assert pool._free.qsize() <= 1  # the small block is gone, the large one was lent again or lies there
+    assert len(pool._free) <= 1  # the small block is gone, the large one was lent again or lies there
 
 
 def test_no_more_is_kept_than_was_said():
@@ -73,7 +73,7 @@ def test_no_more_is_kept_than_was_said():
     held = [pool.take(MIB) for _ in range(6)]
     assert len(pool._blocks) == 6
     del held
-    assert pool._free.qsize() == len(pool._blocks) <= 2
+    assert len(pool._free) == len(pool._blocks) <= 2
 
 
 def test_memory_that_comes_back_in_a_moment_is_waited_for(monkeypatch):
@@ -146,3 +146,21 @@ def test_page_locked_memory_is_used_again_too():
     assert block.is_pinned()
     del block
     assert pool.take(MIB).data_ptr() == place
+
+
+@pytest.mark.timeout(60)
+def test_many_threads_that_wait_for_memory_all_go_on(monkeypatch):
+    """However often a moment ends just when memory comes back: nobody waits longer than that."""
+    monkeypatch.setattr(buffers, "_PATIENCE_S", 2e-5)
+    pool = BufferPool(blocks=2)
+
+    def take_some(times: int) -> None:
+        for _ in range(times):
+            pool.take(1000)
+
+    threads = [threading.Thread(target=take_some, args=(3000,), daemon=True) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(timeout=30)
+        assert not thread.is_alive()
