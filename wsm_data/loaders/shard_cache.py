@@ -135,7 +135,8 @@ class ShardCache:
 
     def remove(self, shard: CachedShard) -> None:
         """Remove a shard whose bytes turned out to be wrong; those who have it open may read on."""
-        self._path(shard).unlink(missing_ok=True)
+        with self.locked():  # else who makes room could find it gone between two looks at it
+            self._path(shard).unlink(missing_ok=True)
 
     @contextmanager
     def locked(self) -> Iterator[None]:

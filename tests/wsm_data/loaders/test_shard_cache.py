@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 
 import pytest
 from hypothesis import given, settings
@@ -141,6 +142,18 @@ def test_a_removed_shard_may_be_read_on_by_who_has_it_open(cache):
         cache.remove(shard(0))
         cache.remove(shard(0))
         assert len(os.pread(descriptor, KIB, 0)) == KIB
+    assert not has(cache, shard(0))
+
+
+def test_nothing_is_removed_while_somebody_makes_room(cache):
+    put(cache, shard(0))
+    removing = threading.Thread(target=cache.remove, args=(shard(0),))
+    with cache.locked():
+        removing.start()
+        removing.join(timeout=0.2)
+        assert removing.is_alive()
+        assert has(cache, shard(0))
+    removing.join(timeout=20)
     assert not has(cache, shard(0))
 
 
