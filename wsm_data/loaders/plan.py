@@ -47,7 +47,7 @@ class EpochPlan:
         epoch: number of the epoch.
         order: settings of the order.
         refs: clips of the epoch, row after row; int64 [clips].
-        row_starts: first clip of each row in `refs`, and the end; int64 [rows + 1].
+        row_starts: first clip of each row in `refs`, and the end; int64 [rows + 1]. None where each row is one clip.
         slots: row in each slot of each step, `EMPTY_ROW` where there is none; int64 [global_batch, steps].
         sequence_latents: latents of every clip of the sources by ref, cut to `max_latents`; int32 [all clips].
     """
@@ -55,7 +55,7 @@ class EpochPlan:
     epoch: int
     order: OrderConfig
     refs: Int64Array
-    row_starts: Int64Array
+    row_starts: Int64Array | None
     slots: Int64Array
     sequence_latents: Int32Array
 
@@ -83,8 +83,8 @@ class EpochPlan:
     @cached_property
     def report(self) -> PlanReport:
         """What becomes of the clips; counted when it is first asked for."""
-        times = np.bincount(self.slots[self.slots != EMPTY_ROW], minlength=len(self.row_starts) - 1)
-        clips_per_row = np.diff(self.row_starts)
+        clips_per_row = np.ones(len(self.refs), np.int64) if self.row_starts is None else np.diff(self.row_starts)
+        times = np.bincount(self.slots[self.slots != EMPTY_ROW], minlength=len(clips_per_row))
         return PlanReport(
             clips=len(self.refs),
             rows=len(clips_per_row),
@@ -98,7 +98,8 @@ class EpochPlan:
     def _row(self, number: int) -> Int64Array:
         if number == EMPTY_ROW:
             return np.empty(0, np.int64)
-        return self.refs[self.row_starts[number] : self.row_starts[number + 1]]
+        starts = self.row_starts
+        return self.refs[number : number + 1] if starts is None else self.refs[starts[number] : starts[number + 1]]
 
     def _padding_share(self) -> float:
         lengths = np.append(_row_lengths(self.refs, self.row_starts, self.sequence_latents), 0)  # of EMPTY_ROW, last
@@ -121,7 +122,7 @@ def plan_epoch(layouts: Sequence[SourceLayout], order: OrderConfig, epoch: int) 
     """
     sequence_latents = _sequence_latents(layouts, order)
     refs, row_starts = _rows(mixed_refs(layouts, order, epoch), sequence_latents, order)
-    rows = len(row_starts) - 1
+    rows = len(refs) if row_starts is None else len(row_starts) - 1
     slots = deal_lanes(rows, order) if rows else np.empty((order.global_batch, 0), np.int64)
     if not slots.shape[1]:
         raise ConfigError(
@@ -177,10 +178,10 @@ def _sequence_latents(layouts: Sequence[SourceLayout], order: OrderConfig) -> In
     return np.minimum(latents, np.int32(order.max_latents)) if order.max_latents else latents
 
 
-def _rows(refs: Int64Array, sequence_latents: Int32Array, order: OrderConfig) -> tuple[Int64Array, Int64Array]:
-    """Refs row after row, and where each row starts."""
+def _rows(refs: Int64Array, sequence_latents: Int32Array, order: OrderConfig) -> tuple[Int64Array, Int64Array | None]:
+    """Refs row after row, and where each row starts; None where each is one clip."""
     if order.arrangement is not Arrangement.PACK:
-        return refs, np.arange(len(refs) + 1)
+        return refs, None
     from wsm_data.loaders.packing import pack_rows  # numba, for those who pack
 
     _require_fitting(sequence_latents, order)
@@ -197,6 +198,8 @@ def _require_fitting(sequence_latents: Int32Array, order: OrderConfig) -> None:
         )
 
 
-def _row_lengths(refs: Int64Array, row_starts: Int64Array, sequence_latents: Int32Array) -> Int64Array:
+def _row_lengths(refs: Int64Array, row_starts: Int64Array | None, sequence_latents: Int32Array) -> Int64Array:
+    if row_starts is None:
+        return sequence_latents[refs].astype(np.int64)
     ends = np.concatenate([[0], np.cumsum(sequence_latents[refs], dtype=np.int64)])
     return np.diff(ends[row_starts])
