@@ -19,7 +19,8 @@ def training_loader(
     config: TrainRunConfig, device: torch.device, ledger: str, rank: int, world_size: int
 ) -> ClipLoader:
     """The loader of this rank, with its ledger in the run's folder."""
-    read = replace(config.read, device=str(device), pin_memory=device.type == "cuda")
+    is_pinned = device.type == "cuda" and not config.read.workers  # batches of workers come through shared memory
+    read = replace(config.read, device=str(device), pin_memory=is_pinned)
     settings = LoaderConfig(sources=config.sources, order=config.order, read=read, ledger=ledger)
     return ClipLoader(settings, rank=rank, world_size=world_size)
 

@@ -2,7 +2,7 @@
 
 import os
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from types import TracebackType
 from typing import Any
@@ -10,17 +10,21 @@ from typing import Any
 import torch.utils.data
 
 from wsm_data.errors import ConfigError
-from wsm_data.loaders.batch import Batch
+from wsm_data.loaders.batch import Batch, PackedBatch
 from wsm_data.loaders.config import LoaderConfig
 from wsm_data.loaders.ledger import LedgerWriter
 from wsm_data.loaders.plan import EpochPlan, PlanReport, rows_per_rank
 from wsm_data.loaders.ranks import place_among_ranks
+from wsm_data.loaders.shard_reader import ShardReader
 from wsm_data.loaders.source_table import Sources, open_sources
 from wsm_data.loaders.state import loader_state, restore, state_to_json
 from wsm_data.loaders.step_reader import StepReader
-from wsm_data.loaders.stream import BatchStream, open_stream
+from wsm_data.loaders.stream import BatchStream, Delivered, open_stream
 from wsm_data.loaders.timing import Part, Timing
 from wsm_data.loaders.transfer import hand_over, open_transfer
+
+_CLOSED = -1
+"""In place of the number of the process that a reader belongs to."""
 
 
 class ClipLoader(torch.utils.data.IterableDataset[Batch]):
@@ -28,7 +32,11 @@ class ClipLoader(torch.utils.data.IterableDataset[Batch]):
 
     An iterator starts when it is first advanced, so that one nobody advances changes nothing. There is one place, that
     of `state_dict`: when another iterator is started, or the place is changed, an older iterator raises RuntimeError.
-    Within a worker of a torch DataLoader (`batch_size=None`), worker w of n gives the steps w, w + n, ...
+
+    Within a worker of a torch DataLoader (`batch_size=None`), worker w of n gives the steps w, w + n, ... Workers have
+    copies, and the loader in the training process never moves: its `state_dict` stays where it is (take that of
+    torchdata's StatefulDataLoader), and without `set_epoch` before each pass every pass is of the same epoch. Only with
+    `persistent_workers=True` do the copies live on, and move on by themselves.
     """
 
     def __init__(
@@ -65,7 +73,7 @@ class ClipLoader(torch.utils.data.IterableDataset[Batch]):
         self._plan: EpochPlan | None = None
         self._epoch, self._step = 0, 0
         self._turn = 0
-        self._running: BatchStream | None = None
+        self._running: BatchStream[Any] | None = None
         self.timing = Timing()
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -85,6 +93,7 @@ class ClipLoader(torch.utils.data.IterableDataset[Batch]):
             ConfigError: the epoch has no step, or a clip does not fit into a packed row.
         """
         if self._plan is None or self._plan.epoch != self._epoch:
+            self._plan = None  # its memory is free before the next one takes as much
             self._plan = self._sources.plan(self._config.order, self._epoch)
         return self._plan
 
@@ -125,21 +134,41 @@ class ClipLoader(torch.utils.data.IterableDataset[Batch]):
             self._move_to(epoch, 0)
 
     def __iter__(self) -> Iterator[Batch]:
+        return self.completed(lambda batch, _: batch, lambda batch: batch)
+
+    def completed(
+        self,
+        complete: Callable[[Batch, Sequence[ShardReader]], Delivered],
+        batch_of: Callable[[Delivered], Batch],
+    ) -> Iterator[Delivered]:
+        """Iterate over what is made of each batch where it is read; only then does its step count as delivered.
+
+        Args:
+            complete: makes it of a batch, with the readers of the sources' shards; called in the threads that read.
+            batch_of: the batch that something was made of.
+        """
         self._turn += 1
-        turn, stream = self._turn, self._start()
+        turn, stream = self._turn, self._start(complete)
         try:
-            while (batch := self._deliver(turn, stream)) is not None:
-                yield batch
-                del batch  # its memory is free as soon as the caller lets go of it
-        finally:
-            stream.close()
+            while (delivered := self._deliver(turn, stream, batch_of)) is not None:
+                yield delivered
+                del delivered  # its memory is free as soon as the caller lets go of it
+        except BaseException:  # an error of a step, an interrupt, or the caller breaks off
+            if turn == self._turn:
+                self._stop()
+            raise
+        stream.close()
+        self._running = None
         self._epoch, self._step = self._epoch + 1, 0
 
     def close(self) -> None:
-        """End all threads and processes, close the files and the ledger. A later iterator opens them again."""
+        """End all threads and processes, close the files and the ledger. A later iterator opens them again.
+
+        What a store is being asked is given up, not waited for.
+        """
         self._turn += 1
         self._stop()
-        self._reader.close()
+        self._close_reader()
         if self._ledger is not None:
             self._ledger.close()
 
@@ -151,11 +180,16 @@ class ClipLoader(torch.utils.data.IterableDataset[Batch]):
     ) -> None:
         self.close()
 
-    def _start(self) -> BatchStream:
+    def _start(self, complete: Callable[[Batch, Sequence[ShardReader]], Delivered]) -> BatchStream[Delivered]:
         """Begin to deliver from the current place; an older iterator stops reading."""
         self._stop()
-        if self._process != os.getpid():  # a fork takes neither threads nor connections along
+        if self._process != os.getpid():  # closed, or of another process: a fork takes neither threads nor connections
             self._reader, self._process = self._open_reader(), os.getpid()
+        transfer, readers = self._transfer, self._reader.readers
+
+        def finish(packed: PackedBatch) -> Delivered:
+            return complete(transfer(packed), readers)
+
         worker = torch.utils.data.get_worker_info()
         first, stride = (0, 1) if worker is None else (worker.id, worker.num_workers)
         if worker is not None:
@@ -163,27 +197,32 @@ class ClipLoader(torch.utils.data.IterableDataset[Batch]):
         steps = range(self._step + (first - self._step) % stride, self.steps, stride)
         if self._ledger is not None:
             self._ledger.begin(self._epoch, self._step, self.steps)
-        self._running = open_stream(
-            self._reader, self._transfer, self.plan, steps, self._config.read, self.timing, inline=worker is not None
+        stream = open_stream(
+            self._reader, finish, self.plan, steps, self._config.read, self.timing, inline=worker is not None
         )
-        return self._running
+        self._running = stream
+        return stream
 
-    def _deliver(self, turn: int, stream: BatchStream) -> Batch | None:
-        """The next batch, counted and recorded; None where the epoch is over."""
+    def _deliver(
+        self, turn: int, stream: BatchStream[Delivered], batch_of: Callable[[Delivered], Batch]
+    ) -> Delivered | None:
+        """What comes next, counted and recorded; None where the epoch is over."""
         if turn != self._turn:
             raise RuntimeError(
                 "this iterator was overtaken: another one was started since, or the loader was moved or closed; a "
                 "loader has one place, so advance the newest iterator only"
             )
         start = time.perf_counter()
-        batch = next(stream, None)
+        delivered = next(stream, None)
         self.timing.add({Part.WAIT: time.perf_counter() - start})
-        if batch is None:
+        if delivered is None:
             return None
+        batch = batch_of(delivered)
         if self._ledger is not None:
             self._ledger.record(batch.epoch, batch.step, batch.refs.cpu().numpy())
         self._step = batch.step + 1
-        return hand_over(batch)
+        hand_over(batch)
+        return delivered
 
     def _move_to(self, epoch: int, step: int) -> None:
         self._turn += 1
@@ -191,9 +230,17 @@ class ClipLoader(torch.utils.data.IterableDataset[Batch]):
         self._epoch, self._step = epoch, step
 
     def _stop(self) -> None:
+        """Drop what is read ahead. Where it comes from a store, that is told first: no thread waits for its answer."""
         if self._running is not None:
+            if self._reader.asks_stores:
+                self._close_reader()
             self._running.close()
             self._running = None
+
+    def _close_reader(self) -> None:
+        """The next iterator opens another one."""
+        self._reader.close()
+        self._process = _CLOSED
 
     def _open_reader(self) -> StepReader:
         return StepReader(self._sources, self._config.read, rank=self._rank, world_size=self._world_size)

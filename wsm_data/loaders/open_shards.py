@@ -20,3 +20,8 @@ def open_shards(release: Release, read: ReadConfig) -> ShardReader:
     if read.access is RemoteAccess.SHARDS:
         return CachedShards(release.store.root, release.manifest, read)
     return RangeReader(release.store.root, read)
+
+
+def reads_again_what_it_read(release: Release, read: ReadConfig) -> bool:
+    """Whether a clip comes from the same bytes each time, those of a disk or a cache, and not by a new transfer."""
+    return isinstance(release.store, LocalStore) or read.access is RemoteAccess.SHARDS

@@ -11,8 +11,10 @@ Result = TypeVar("Result")
 class Prefetch(Generic[Result]):
     """An iterator over `read(step)` for each step, of which some are read before they are asked for.
 
-    An error of a step is raised where its result would come; what was read ahead behind it is dropped. Threads end
-    when the iterator ends, fails, or is closed, and at the latest when nobody refers to it any more.
+    An error of a step, or an interrupt while it is waited for, is raised where its result would come; what was read
+    ahead behind it is dropped, but not waited for: `close` does that, when whoever knows how has cut short what the
+    threads wait for. Threads end when the iterator ends, fails, or is closed, and at the latest when nobody refers to
+    it any more.
     """
 
     def __init__(
@@ -35,6 +37,7 @@ class Prefetch(Generic[Result]):
         """
         self._steps, self._read, self._announce = steps, read, announce
         self._depth = max(depth, 1)
+        self._wanted = 1  # the first result comes soonest while nothing else takes memory and its bandwidth
         self._executor = ThreadPoolExecutor(threads, thread_name_prefix="wsm-loader")
         self._pending: deque[Future[Result]] = deque()
 
@@ -45,22 +48,28 @@ class Prefetch(Generic[Result]):
         try:
             self._fill()
             if not self._pending:
+                self.close()
                 raise StopIteration
             result = self._pending.popleft().result()
+            self._wanted = self._depth
             self._fill()
         except BaseException:
-            self.close()
+            self._drop()
             raise
         return result
 
     def close(self) -> None:
         """Drop what was read ahead and wait for the threads to end."""
+        self._drop()
+        self._executor.shutdown(wait=True)
+
+    def _drop(self) -> None:
         self._steps = iter(())
         self._pending.clear()
-        self._executor.shutdown(wait=True, cancel_futures=True)
+        self._executor.shutdown(wait=False, cancel_futures=True)
 
     def _fill(self) -> None:
-        while len(self._pending) < self._depth:
+        while len(self._pending) < self._wanted:
             step = next(self._steps, None)
             if step is None:
                 return

@@ -1,7 +1,6 @@
 """The loader of post-training: queries in the order of a plan, each with its history, its map and its goal."""
 
 import json
-import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import TracebackType
@@ -21,8 +20,7 @@ from wsm_data.loaders.plan import PlanReport
 from wsm_data.loaders.query_batch import QueryBatch
 from wsm_data.loaders.query_table import QueryConfig, QuerySources, open_queries
 from wsm_data.loaders.shard_reader import ShardReader
-from wsm_data.loaders.step_reader import open_readers
-from wsm_data.loaders.verification import Verification
+from wsm_data.loaders.verification import verification_of
 from wsm_data.schema.clip import TEMPORAL_RATIO, UNREACHABLE_MM
 from wsm_data.schema.clip_meta import ClipMeta
 from wsm_data.schema.occupancy import UNKNOWN
@@ -99,13 +97,11 @@ class QueryLoader(torch.utils.data.IterableDataset[QueryBatch]):
         self._histories.set_epoch(epoch)
 
     def __iter__(self) -> Iterator[QueryBatch]:
-        for history in self._histories:
-            yield self._maps.with_maps(history)
+        return self._histories.completed(self._maps.with_maps, lambda batch: batch.history)
 
     def close(self) -> None:
-        """End all threads and processes, close the files and the ledger."""
+        """End all threads and processes, close the files and the ledger. A later iterator opens them again."""
         self._histories.close()
-        self._maps.close()
 
     def __enter__(self) -> "QueryLoader":
         return self
@@ -137,21 +133,23 @@ class _ClipMap:
 
 
 class _MapReader:
-    """Reads what stands behind the members of a batch: map, field, distances and meta data."""
+    """Reads what stands behind the members of a batch: map, field, distances, meta data. Safe for several threads."""
 
     def __init__(self, sources: QuerySources, read: ReadConfig):
-        self._sources, self._read = sources, read
-        self._verification = Verification(read.verify, [len(table) for table in sources.tables])
-        self._readers: Sequence[ShardReader] = ()
-        self._process = -1
+        self._sources = sources
+        self._verification = verification_of(sources.tables, read)
 
-    def with_maps(self, history: Batch) -> QueryBatch:
+    def with_maps(self, history: Batch, readers: Sequence[ShardReader]) -> QueryBatch:
         """Put the maps to the histories of a step.
+
+        Args:
+            history: the histories.
+            readers: of the shards of each source.
 
         Raises:
             IntegrityError: the bytes of a clip are not those that the release vouches for; names shard and clip.
         """
-        maps = self._clip_maps(history.refs.tolist())
+        maps = self._clip_maps(history.refs.tolist(), readers)
         replan = history.lengths.cpu().numpy() - 1
         T_world_camera0 = np.array([one.meta.T_world_camera0_matrix for one in maps]).reshape(-1, 4, 4)
         resolution_m = np.array([one.meta.map_resolution_m for one in maps])
@@ -173,11 +171,6 @@ class _MapReader:
         }
         return QueryBatch(history=history, **{name: torch.from_numpy(array) for name, array in arrays.items()})
 
-    def close(self) -> None:
-        for reader in self._readers:
-            reader.close()
-        self._readers, self._process = (), -1
-
     def _future(self, maps: Sequence[_ClipMap], replan: np.ndarray) -> np.ndarray:
         frames = 1 + TEMPORAL_RATIO * self._sources.queries.future_latents
         future = np.empty((len(maps), frames), np.float32)
@@ -185,11 +178,10 @@ class _MapReader:
             future[number] = one.expert_distance[TEMPORAL_RATIO * latent :][:frames]
         return future
 
-    def _clip_maps(self, refs: Sequence[int]) -> list[_ClipMap]:
+    def _clip_maps(self, refs: Sequence[int], readers: Sequence[ShardReader]) -> list[_ClipMap]:
         places = [self._sources.locate(ref) for ref in refs]
         owners = [self._sources.tables.index(table) for table, _ in places]
         rows = [table.index_row(number) for table, number in places]
-        readers = self._open_readers()
         for owner, row in zip(owners, rows, strict=True):  # a slow store is asked for all of them at once
             readers[owner].expect([span_of_members(row, _MAP_MEMBERS)])
         return [
@@ -206,11 +198,6 @@ class _MapReader:
             for member in members[:-1]
         }
         return _ClipMap(meta=_meta(content_of(data, members[-1]), row), **arrays)
-
-    def _open_readers(self) -> Sequence[ShardReader]:
-        if self._process != os.getpid():  # a fork takes neither threads nor connections along
-            self._readers, self._process = open_readers(self._sources, self._read), os.getpid()
-        return self._readers
 
 
 def _meta(content: memoryview, row: IndexRow) -> ClipMeta:

@@ -3,6 +3,7 @@
 import logging
 import threading
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -23,8 +24,7 @@ from wsm_data.loaders.shard_reader import ShardReader
 from wsm_data.loaders.source_table import Sources
 from wsm_data.loaders.standardise import convert, standardisations
 from wsm_data.loaders.timing import Part, Stopwatch
-from wsm_data.loaders.transfer import device_of
-from wsm_data.loaders.verification import Verification
+from wsm_data.loaders.verification import verification_of
 
 _LOG = logging.getLogger(__name__)
 _STORED = torch.float16
@@ -52,7 +52,7 @@ class StepReader:
         manifest = sources.tables[0].release.manifest
         codec = manifest.codec
         cells = (manifest.encoded_height_px // codec.spatial_ratio, manifest.encoded_width_px // codec.spatial_ratio)
-        as_stored = device_of(read).type != "cpu"
+        as_stored = torch.device(read.device).type != "cpu"  # not looked for: a forked process must not ask for it
         self._sources, self._read, self._rank, self._world_size = sources, read, rank, world_size
         self._latent_shape = (codec.channels, *cells)
         self._dtype = _STORED if as_stored else LATENT_DTYPES[read.dtype]
@@ -60,19 +60,34 @@ class StepReader:
         if self._standardise and len({table.release.store.root for table in sources.tables}) > 1:
             _LOG.warning("latents of all sources are standardised by the statistics of the first, %s", manifest.name)
         self._converts = self._dtype is not _STORED or bool(self._standardise)
-        self._verification = Verification(read.verify, [len(table) for table in sources.tables])
+        self._verification = verification_of(sources.tables, read)
         self._pool = BufferPool(blocks=max(read.prefetch_batches, 1) + 1, pinned=read.pin_memory)
         self._staging = threading.local()
-        self._readers = open_readers(sources, read)
+        self._readers = _open_readers(sources, read)
         self._looking_ahead = [item for item in dict.fromkeys(self._readers) if not isinstance(item, LocalShards)]
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Cross to another process as settings; what is open stays here."""
-        return partial(StepReader, rank=self._rank, world_size=self._world_size), (self._sources, self._read)
+        """Cross to another process as settings; what is open stays here.
+
+        Page-locked memory is left to the process that has the GPU: batches cross to it through shared memory.
+        """
+        elsewhere = replace(self._read, pin_memory=False)
+        return partial(StepReader, rank=self._rank, world_size=self._world_size), (self._sources, elsewhere)
 
     def reopened(self) -> "StepReader":
-        """One like this, with files, threads and connections of its own."""
-        return StepReader(self._sources, self._read, rank=self._rank, world_size=self._world_size)
+        """One like this for another process, with files, threads and connections of its own."""
+        make, arguments = self.__reduce__()
+        return make(*arguments)
+
+    @property
+    def readers(self) -> Sequence[ShardReader]:
+        """The reader of the shards of each source."""
+        return self._readers
+
+    @property
+    def asks_stores(self) -> bool:
+        """Whether anything is read from behind a URL, so that reading may have to wait for a store."""
+        return bool(self._looking_ahead)
 
     def announce(self, plan: EpochPlan, step: int) -> None:
         """Tell the readers what a step will need, before it is read."""
@@ -150,7 +165,7 @@ class StepReader:
         return dict(zip(LATENT_TENSORS, held[:size].view(shape), strict=True))
 
 
-def open_readers(sources: Sources, read: ReadConfig) -> Sequence[ShardReader]:
+def _open_readers(sources: Sources, read: ReadConfig) -> Sequence[ShardReader]:
     """A reader for each source; sources of one release share it."""
     by_root: dict[str, ShardReader] = {}
     for table in sources.tables:

@@ -2,8 +2,9 @@
 
 from collections.abc import Callable, Generator, Sequence
 from itertools import chain, islice, repeat
+from typing import TypeVar
 
-from wsm_data.loaders.batch import Batch, PackedBatch
+from wsm_data.loaders.batch import PackedBatch
 from wsm_data.loaders.config import ReadConfig, RemoteAccess
 from wsm_data.loaders.plan import EpochPlan
 from wsm_data.loaders.prefetch import Prefetch
@@ -11,9 +12,11 @@ from wsm_data.loaders.step_reader import StepReader
 from wsm_data.loaders.timing import Part, Stopwatch, Timing
 from wsm_data.loaders.worker_processes import StepDataset, read_in_processes
 
-BatchStream = Prefetch[Batch] | Generator[Batch, None, None]
-"""Batches one after the other; `close` stops reading and waits until threads and processes have ended."""
+Delivered = TypeVar("Delivered")
 
+BatchStream = Prefetch[Delivered] | Generator[Delivered, None, None]
+"""Batches, or what is made of them, one after the other; `close` stops reading and waits until threads and processes
+have ended."""
 
 _CLIPS_AHEAD = 8192
 """Clips of all ranks whose shards a cache of shards is told of in advance. The lanes of a step come to new shards at
@@ -22,19 +25,19 @@ about the same time, so that many are needed at once: the downloads must begin s
 
 def open_stream(
     reader: StepReader,
-    transfer: Callable[[PackedBatch], Batch],
+    transfer: Callable[[PackedBatch], Delivered],
     plan: EpochPlan,
     steps: Sequence[int],
     read: ReadConfig,
     timing: Timing,
     *,
     inline: bool,
-) -> BatchStream:
+) -> BatchStream[Delivered]:
     """Begin to read.
 
     Args:
         reader: reads a step.
-        transfer: makes the batch of what was read.
+        transfer: makes the batch of what was read, or more than that; called in the threads that read.
         plan: of the epoch.
         steps: what is read, in this order.
         read: threads, workers, and how far to read ahead.
@@ -42,17 +45,17 @@ def open_stream(
         inline: read in the caller's thread, whatever the settings say.
     """
 
-    def finished(packed: PackedBatch) -> Batch:
+    def finished(packed: PackedBatch) -> Delivered:
         watch = Stopwatch()
         with watch.measure(Part.TRANSFER):
-            batch = transfer(packed)
+            delivered = transfer(packed)
         timing.add(packed.seconds)
         timing.add(watch.seconds)
-        return batch
+        return delivered
 
     announce = _announcer(reader, plan, steps, read)
 
-    def read_step(step: int) -> Batch:
+    def read_step(step: int) -> Delivered:
         return finished(reader.read(plan, step))
 
     if read.workers and not inline:
@@ -77,15 +80,15 @@ def _announcer(reader: StepReader, plan: EpochPlan, steps: Sequence[int], read: 
 
 
 def _one_by_one(
-    steps: Sequence[int], read_step: Callable[[int], Batch], announce: Callable[[int], None]
-) -> Generator[Batch, None, None]:
+    steps: Sequence[int], read_step: Callable[[int], Delivered], announce: Callable[[int], None]
+) -> Generator[Delivered, None, None]:
     for step in steps:
         announce(step)
         yield read_step(step)
 
 
 def _by_processes(
-    dataset: StepDataset, steps: Sequence[int], read: ReadConfig, finished: Callable[[PackedBatch], Batch]
-) -> Generator[Batch, None, None]:
+    dataset: StepDataset, steps: Sequence[int], read: ReadConfig, finished: Callable[[PackedBatch], Delivered]
+) -> Generator[Delivered, None, None]:
     for packed in read_in_processes(dataset, steps, read):
         yield finished(packed)

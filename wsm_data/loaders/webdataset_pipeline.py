@@ -24,7 +24,7 @@ from wsm_data.loaders.ranks import place_among_ranks
 from wsm_data.loaders.shard_reader import ShardReader, Span
 from wsm_data.loaders.source_table import SourceTable, open_sources
 from wsm_data.loaders.stable_hash import Int64Array
-from wsm_data.loaders.verification import Verification
+from wsm_data.loaders.verification import Verification, verification_of
 from wsm_data.shards.members import MEMBER_NAMES
 
 
@@ -118,7 +118,7 @@ class _Samples:
         """The release, opened by this process."""
         if self._opened is None or self._opened[0] != os.getpid():
             [table] = open_sources([self.source]).tables
-            verification = Verification(self.read.verify, [len(table)])
+            verification = verification_of([table], self.read)
             self._opened = os.getpid(), _Opened(table, open_shards(table.release, self.read), verification)
         return self._opened[1]
 

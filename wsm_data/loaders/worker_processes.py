@@ -17,7 +17,11 @@ from wsm_data.loaders.step_reader import StepReader
 
 
 class StepDataset(torch.utils.data.Dataset[PackedBatch]):
-    """The steps of an epoch by number; a process that got a copy of it opens the shards for itself."""
+    """The steps of an epoch by number; a process that got a copy of it opens the shards for itself.
+
+    Such a process knows nothing of the steps that it will be asked for, so of a store each clip is asked for when its
+    step is; and it has no page-locked memory.
+    """
 
     def __init__(self, reader: StepReader, plan: EpochPlan):
         self._reader, self._plan = reader, plan

@@ -2,6 +2,7 @@ import gc
 import json
 import pickle
 import threading
+from contextlib import suppress
 from itertools import islice
 from pathlib import Path
 
@@ -200,6 +201,31 @@ def test_workers_of_a_dataloader_deal_the_steps_among_them(make_loader, workers)
     assert [found[step] for step in sorted(found)] == expected[1:]
 
 
+def _pass_of(outer: torch.utils.data.DataLoader) -> list[tuple[int, int, list[int]]]:
+    return sorted((batch.epoch, batch.step, batch.refs.tolist()) for batch in outer)
+
+
+def test_workers_of_a_dataloader_are_at_the_epoch_that_the_loader_is_told(make_loader):
+    """Every pass has new copies of the loader, which itself never moves."""
+    alone, loader = make_loader(), make_loader()
+    expected = [sorted((batch.epoch, batch.step, batch.refs.tolist()) for batch in alone) for _ in range(2)]
+    outer = torch.utils.data.DataLoader(loader, batch_size=None, num_workers=2)
+    found = []
+    for epoch in range(2):
+        loader.set_epoch(epoch)
+        found.append(_pass_of(outer))
+    assert found == expected
+    assert _pass_of(outer) == expected[1]  # nobody said otherwise
+    assert (loader.state_dict()["epoch"], loader.state_dict()["step"]) == (1, 0)
+
+
+def test_persistent_workers_of_a_dataloader_move_on_by_themselves(make_loader):
+    alone = make_loader()
+    expected = [sorted((batch.epoch, batch.step, batch.refs.tolist()) for batch in alone) for _ in range(2)]
+    outer = torch.utils.data.DataLoader(make_loader(), batch_size=None, num_workers=2, persistent_workers=True)
+    assert [_pass_of(outer), _pass_of(outer)] == expected
+
+
 def test_inside_a_dataloader_only_what_works_there_is_allowed(make_loader, tmp_path):
     outer = torch.utils.data.DataLoader(make_loader(ledger=str(tmp_path / "ledger")), batch_size=None, num_workers=1)
     with pytest.raises(ConfigError, match="must leave these settings out, found ledger"):
@@ -220,10 +246,18 @@ def test_the_goal_is_that_of_the_meta_data(tmp_path, make_source, run_pipeline):
             np.testing.assert_allclose(batch.goal_camera0_m[0].numpy(), goal, rtol=2**-24, atol=1e-30)
 
 
-def test_no_file_of_a_closed_loader_stays_open(make_loader):
-    gc.collect()  # what earlier tests left in cycles
-    before = len(list(Path("/proc/self/fd").iterdir()))
-    loader = make_loader()
+def _open_below(folder: Path) -> set[str]:
+    names = set()
+    for link in Path("/proc/self/fd").iterdir():
+        with suppress(FileNotFoundError):  # that of the listing itself
+            names.add(str(link.readlink()))
+    return {name for name in names if name.startswith(f"{folder}/")}
+
+
+def test_no_file_of_a_closed_loader_stays_open(released, make_loader, tmp_path):
+    folder = released.copied(tmp_path / "release")
+    loader = make_loader(folder)
     _refs(loader)
+    assert _open_below(folder)
     loader.close()
-    assert len(list(Path("/proc/self/fd").iterdir())) == before
+    assert _open_below(folder) == set()

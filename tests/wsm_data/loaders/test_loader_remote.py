@@ -108,6 +108,17 @@ def test_bytes_that_stay_wrong_end_the_epoch_with_the_name_of_the_shard(epoch, e
     assert steps == expected[: len(steps)]
 
 
+def test_wrong_bytes_of_a_later_epoch_are_noticed_where_nothing_is_kept(remote, published):
+    """Every ranged read is a new transfer, so `verify = first`, the default, compares it each time."""
+    config = LoaderConfig(sources=(SourceConfig(release=remote.url),), order=ORDER, read=remote.read())
+    with ClipLoader(config, rank=0, world_size=1) as loader:
+        assert len(list(loader)) == STEPS
+        bad = published.manifest.shards[-1].name
+        remote.proxy.spoil(bad, Fault.WRONG_BYTES, FOREVER)
+        with pytest.raises(IntegrityError, match=bad):
+            list(loader)
+
+
 @BOTH
 def test_an_epoch_is_that_of_the_local_folder_and_asks_for_no_listing_that_could_be_stale(
     epoch, expected, remote, access

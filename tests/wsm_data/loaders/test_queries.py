@@ -186,16 +186,37 @@ def test_worker_processes_of_a_data_loader_give_the_same(driven, workers):
         assert seen(batches) == expected
 
 
-def test_damage_of_a_map_is_named(driven):
-    release, _ = driven
+def damage_map(release, query):
+    """Change a byte of the map of a query; returns the row of its clip."""
     with QueryLoader(config_of(release), TWO) as loader:
-        row = loader.sources.tables[0].index_row(0)
+        row = loader.sources.tables[0].index_row(query)
     [member] = [member for member in row.members if member.name == "geodesic_mm"]
     with open(f"{release}/{row.shard}", "r+b") as file:  # noqa: PTH123  # a path of the store, not of a test
         file.seek(row.clip_offset + member.array_offset)
         byte = file.read(1)
         file.seek(-1, 1)
         file.write(bytes([byte[0] ^ 1]))
+    return row
+
+
+@pytest.mark.parametrize("reading", [{"threads": 0}, {"threads": 2, "prefetch_batches": 4}, {"workers": 1}], ids=str)
+def test_a_step_whose_map_is_damaged_is_neither_counted_nor_recorded(driven, tmp_path, reading):
+    """Two queries a clip and two a step: in the order of the index, step 3 has the fourth clip."""
+    release, _ = driven
+    row = damage_map(release, 6)
+    config = config_of(release, shuffle=False, ledger=str(tmp_path / "ledger"), read=ReadConfig(**reading))
+    delivered = []
+    with QueryLoader(config, TWO) as loader:
+        with pytest.raises(IntegrityError, match=row.key):
+            delivered.extend(loader)
+        assert len(delivered) == loader.state_dict()["step"] == 3
+    [epoch] = read_timeline(tmp_path / "ledger").epochs
+    assert [step for step, _ in epoch.by_step()] == [0, 1, 2]
+
+
+def test_damage_of_a_map_is_named(driven):
+    release, _ = driven
+    row = damage_map(release, 0)
     with (
         QueryLoader(config_of(release), TWO) as loader,
         pytest.raises(IntegrityError, match=rf"{row.shard}, clip {row.key}: the checksum of geodesic_mm\.npy"),

@@ -1,5 +1,7 @@
 import os
+import pickle
 import signal
+from dataclasses import replace
 from itertools import islice
 
 import pytest
@@ -47,6 +49,32 @@ def test_what_workers_read_is_what_is_read_here(dataset):
         for name, tensor in packed.tensors().items():
             assert torch.equal(tensor, own.tensors()[name]), name
         assert sum(packed.seconds.values()) > 0
+
+
+def test_batches_and_readers_pickle(dataset):
+    """A batch that did not would be dropped by torch without a word, and waited for without end."""
+    packed = dataset[1]
+    copy = pickle.loads(pickle.dumps(packed))  # noqa: S301
+    assert (copy.layout, copy.keys, copy.epoch, copy.step) == (packed.layout, packed.keys, packed.epoch, packed.step)
+    assert torch.equal(copy.block, packed.block)
+    assert torch.equal(pickle.loads(pickle.dumps(dataset))[1].block, packed.block)  # noqa: S301
+
+
+def test_workers_have_no_page_locked_memory(released, monkeypatch):
+    """They would need the GPU, which a forked process must not touch; without one, page-locking raises."""
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
+    read = replace(READ, pin_memory=True, device="cuda")
+    sources = open_sources([SourceConfig(release=str(released.folder))])
+    plan = sources.plan(OrderConfig(global_batch=4), 0)
+    dataset = StepDataset(StepReader(sources, read, rank=0, world_size=1), plan)
+    monkeypatch.setattr(torch.cuda, "is_available", _must_not_be_asked)
+    found = list(read_in_processes(dataset, range(2), read))
+    assert [packed.step for packed in found] == [0, 1]
+    assert {packed.tensors()["rgb"].dtype for packed in found} == {torch.float16}  # as stored: for the GPU
+
+
+def _must_not_be_asked() -> bool:
+    raise AssertionError("a process without the GPU looked for it")
 
 
 def test_an_error_of_a_worker_comes_at_its_step_with_its_words(dataset):
