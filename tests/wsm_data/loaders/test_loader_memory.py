@@ -1,12 +1,15 @@
 """What a loader holds does not grow: memory, open files, threads."""
 
 import gc
+import subprocess
+import sys
 import threading
 from pathlib import Path
 
 import pytest
 
 from wsm_data.loaders import buffers
+from wsm_data.loaders.config import LoaderConfig, OrderConfig, ReadConfig, RemoteAccess, SourceConfig
 from wsm_data.loaders.loader import ClipLoader
 
 WARM_UP_EPOCHS, EPOCHS = 5, 20
@@ -43,6 +46,37 @@ def test_memory_files_and_threads_are_constant_over_20_epochs(make_loader, setti
     _epochs(loader, EPOCHS)
     assert _resident_bytes() - memory < TOLERANCE_BYTES
     assert (_open_files(), _threads()) == (files, threads)
+
+
+@pytest.fixture
+def url(released):
+    """The release behind a server that runs in a process of its own, so that nothing of it is counted here."""
+    command = [sys.executable, str(Path(__file__).parent / "fakes" / "folder_server.py"), str(released.folder)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
+        try:
+            yield server.stdout.readline().strip()
+        finally:
+            server.kill()
+
+
+@pytest.mark.timeout(120)
+@pytest.mark.parametrize("access", list(RemoteAccess))
+def test_memory_files_and_threads_are_constant_over_20_epochs_from_a_store(released, url, tmp_path, access):
+    """With a cache of two and a half shards, so that every epoch downloads and removes some."""
+    largest = max(shard.bytes for shard in released.release.manifest.shards)
+    read = ReadConfig(
+        access=access, threads=2, fetch_threads=2, cache_dir=str(tmp_path / "cache"), cache_gib=2.5 * largest / 2**30
+    )
+    order = OrderConfig(seed=3, global_batch=4, window_blocks=2)
+    config = LoaderConfig(sources=(SourceConfig(release=url),), order=order, read=read)
+    with ClipLoader(config) as loader:
+        _epochs(loader, WARM_UP_EPOCHS)
+        memory, files, threads = _resident_bytes(), _open_files(), _threads()
+        _epochs(loader, EPOCHS)
+        assert _resident_bytes() - memory < TOLERANCE_BYTES
+        # Threads that fetch, and a connection for each, are made when all others are busy: at most so many more.
+        assert _open_files() <= files + read.fetch_threads
+        assert _threads() <= threads + read.fetch_threads
 
 
 def test_epochs_that_are_broken_off_leave_nothing_behind(make_loader):

@@ -85,6 +85,25 @@ def test_a_run_resumes_at_every_step_on_any_other_world_size(make_loader, settin
         assert _run(loaders)[: len(expected) - number] == expected[number:]
 
 
+@pytest.mark.parametrize(("workers", "world_sizes"), [(1, (2, 3, 2)), (2, (3, 2, 3))])
+def test_workers_resume_on_other_world_sizes_in_the_same_order(make_loader, workers, world_sizes):
+    """A step each on two world sizes, then the rest of two epochs on another; all combinations are in the slow test."""
+    expected = _run(_ranks(make_loader, 1, SHORT | {"threads": 0}))
+    found: list[list[int]] = []
+    state = make_loader(**SHORT).state_dict()
+    for number, world_size in enumerate(world_sizes):
+        loaders = _ranks(make_loader, world_size, SHORT | {"workers": workers})
+        for loader in loaders:
+            loader.load_state_dict(state)
+        if number == len(world_sizes) - 1:
+            found += _run(loaders)
+        else:
+            batches = [next(iter(loader)) for loader in loaders]
+            found.append([ref for batch in batches for ref in batch.refs.tolist()])
+            state = loaders[0].state_dict()
+    assert found == expected
+
+
 def test_an_interrupted_epoch_goes_on_with_fewer_ranks_and_again_with_more(make_loader):
     expected = _run(_ranks(make_loader, 1, SHORT | {"threads": 0}))
     found: list[list[int]] = []
