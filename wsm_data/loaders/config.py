@@ -127,7 +127,8 @@ class ReadConfig:
         verify: when checksums are compared: `first` time a process reads a clip, `always`, or `never`. Worker processes
             are started anew for each epoch, and check each clip again in it.
         threads: threads that read ahead in the training process; 0: everything in the caller's thread.
-        workers: worker processes in place of threads; every batch is copied between processes then.
+        workers: worker processes in place of threads; every batch is copied between processes then, and nothing is
+            asked of a store in advance.
         prefetch_batches: batches that are read ahead.
         standardise: subtract mean and divide by standard deviation; otherwise latents come as they are stored.
         dtype: dtype of the latents of a batch: `float32`, `bfloat16`, or `float16`.

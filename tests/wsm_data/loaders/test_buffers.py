@@ -1,4 +1,5 @@
 import gc
+import sys
 import threading
 
 import numpy as np
@@ -149,18 +150,30 @@ def test_page_locked_memory_is_used_again_too():
 
 
 @pytest.mark.timeout(60)
-def test_many_threads_that_wait_for_memory_all_go_on(monkeypatch):
-    """However often a moment ends just when memory comes back: nobody waits longer than that."""
+def test_nobody_waits_on_when_the_moment_ends_just_as_others_take_what_comes_back(monkeypatch):
+    """Several threads wait for a hair's breadth of time while memory comes back bit by bit; then none comes at all."""
     monkeypatch.setattr(buffers, "_PATIENCE_S", 2e-5)
-    pool = BufferPool(blocks=2)
+    pool = BufferPool(blocks=10**9)
+    memory, is_over = np.zeros(16, np.uint8), threading.Event()
+    pool._block_bytes, pool._allocate = len(memory), np.zeros
 
-    def take_some(times: int) -> None:
-        for _ in range(times):
-            pool.take(1000)
+    def take() -> None:
+        while not is_over.is_set():
+            pool._enough = 0  # wait each time, however much was made
+            pool._reused(1)
 
-    threads = [threading.Thread(target=take_some, args=(3000,), daemon=True) for _ in range(4)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join(timeout=30)
-        assert not thread.is_alive()
+    threads = [threading.Thread(target=take, daemon=True) for _ in range(3)]
+    interval_s = sys.getswitchinterval()
+    sys.setswitchinterval(1e-5)
+    try:
+        for thread in threads:
+            thread.start()
+        for _ in range(100_000):
+            if not pool._free:
+                pool._give_back(memory)
+        is_over.set()
+        for thread in threads:
+            thread.join(timeout=20)
+        assert not any(thread.is_alive() for thread in threads)
+    finally:
+        sys.setswitchinterval(interval_s)
