@@ -14,7 +14,7 @@ import pyarrow as pa
 _BLOCK_ROWS = 512  # about two shards
 _KEPT_VALUES = 1 << 22
 """32 MB of numbers: for the 17 columns that a loader reads, a quarter of a million rows. With half of it, not all
-blocks would stay that a process with 48 rows of a step reads from in turn, and they would be read ten times as often."""
+blocks would stay that a process with 48 rows of a step reads from in turn, but be read ten times as often."""
 
 ReadRows = Callable[[int, int], tuple[int, pa.Table]]
 Block = tuple[np.ndarray, ...]
