@@ -77,9 +77,11 @@ def _process(batch: Sequence[Unit], config: SelectConfig, context: StageContext)
         release = open_release(config.release)
         index = release.index.columns(INDEX_COLUMNS)
         scores = _needed_scores(release, config, index["key"])
+        index = index.drop_columns(["key"])  # the scores have the same
+        pa.default_memory_pool().release_unused()  # what reading took, and sorting now needs
         chosen = select_clips(index, scores, partial(read_paths, config.scores_location), config)
         path = context.out / config.file_name
-        write_selection(path, _selection(config, scores, index, chosen, unit.inputs["scores"]))
+        write_selection(path, _selection(config, scores, chosen, unit.inputs["scores"]))
         facts = {
             "clips chosen": len(chosen.rows),
             "of trajectories": chosen.trajectories,
@@ -130,16 +132,13 @@ def _announce_replacement(installed: Path, old: bytes, new: bytes) -> None:
         _LOG.warning("%s is replaced by a selection with other settings: %s", installed, "; ".join(changes))
 
 
-def _selection(
-    config: SelectConfig, scores: ScoreTable, index: pa.Table, chosen: ChosenClips, scores_digest: str
-) -> Selection:
-    keys = index["key"].take(pa.array(chosen.rows))
+def _selection(config: SelectConfig, scores: ScoreTable, chosen: ChosenClips, scores_digest: str) -> Selection:
     return Selection(
         name=config.name,
         release_digest=scores.release_digest,
         rule=_rule(config, scores, chosen, scores_digest),
         command=_command(config),
-        keys=pa.concat_arrays(keys.chunks),
+        keys=scores.keys.take(pa.array(chosen.rows)),
         scores=chosen.difficulty,
         why=chosen.why,
     )

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from types import MappingProxyType
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -121,13 +122,19 @@ def rate_clips(scores: ScoreTable, config: RuleConfig, rows: NDArray[np.int64] |
         ConfigError: the rule names a score that is not there or has no hard end, or a clip has none of its scores.
     """
     infos = ruling_scores(scores.scorers, config)
+    clips = len(scores.keys) if rows is None else len(rows)
+    mean = _PowerMean(clips, config.emphasis) if config.kind is RuleKind.WEIGHTED else None
+    percentiles: dict[str, Float32Array] = {}
+    ranked: list[Float64Array] = []
     with ThreadPoolExecutor(_SORTS_AT_ONCE) as pool:  # sorting holds no lock, and takes most of the time
-        ranked = list(pool.map(lambda one: hardness_percentiles(_column(scores, one.name, rows), one.direction), infos))
-    percentiles = dict(zip(config.scores, ranked, strict=True))
-    if config.kind is RuleKind.WEIGHTED:
-        difficulty = _weighted_mean(ranked, list(config.weights.values()), config.emphasis)
-    else:
-        difficulty = _lexicographic(ranked)
+        found = pool.map(lambda one: hardness_percentiles(_column(scores, one.name, rows), one.direction), infos)
+        for name, one in zip(config.scores, found, strict=True):
+            percentiles[name] = one.astype(np.float32)
+            if mean is None:
+                ranked.append(one)
+            else:  # and it is let go: ten million numbers are 80 MB
+                mean.add(one, config.weights[name])
+    difficulty = _lexicographic(ranked) if mean is None else mean.result()
     unrated = np.isnan(difficulty)
     if unrated.any():
         place = int(unrated.argmax())
@@ -136,9 +143,7 @@ def rate_clips(scores: ScoreTable, config: RuleConfig, rows: NDArray[np.int64] |
             f"{int(unrated.sum())} clips have none of the scores of the rule ({', '.join(config.scores)}), such as "
             f"{key}; score them, select by other scores, or leave them out with exclude.unscored=true"
         )
-    return Rating(
-        difficulty=difficulty, percentiles={name: one.astype(np.float32) for name, one in percentiles.items()}
-    )
+    return Rating(difficulty=difficulty, percentiles=percentiles)
 
 
 def ruling_scores(scorers: Sequence[ScorerInfo], config: RuleConfig) -> tuple[ScorerInfo, ...]:
@@ -167,13 +172,25 @@ def hardness_percentiles(values: Float64Array, direction: Direction) -> Float64A
     """
     order = np.argsort(values)
     known = len(values) - int(np.isnan(values).sum())  # numpy sorts NaN to the end
-    ordered = values[order[:known]]
-    starts = np.flatnonzero(np.concatenate([[True], ordered[1:] != ordered[:-1]])) if known else np.zeros(0, np.int64)
-    counts = np.diff(np.append(starts, known))
-    shares = (starts + counts / 2) / max(known, 1)
     result = np.full(len(values), np.nan)
-    result[order[:known]] = np.repeat(1 - shares if direction is Direction.LOWER else shares, counts)
+    _fill_mid_ranks(values, order, known, direction is Direction.LOWER, result)
     return result
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _fill_mid_ranks(
+    values: Float64Array, order: NDArray[np.int64], known: int, lower_is_harder: bool, result: Float64Array
+) -> None:
+    """Write the share of each run of equal values, in their order, without a copy of them."""
+    start = 0
+    while start < known:
+        value, end = values[order[start]], start + 1
+        while end < known and values[order[end]] == value:
+            end += 1
+        share = (start + (end - start) / 2) / known
+        for place in range(start, end):
+            result[order[place]] = 1 - share if lower_is_harder else share
+        start = end
 
 
 def _column(scores: ScoreTable, name: str, rows: NDArray[np.int64] | None) -> Float64Array:
@@ -181,18 +198,38 @@ def _column(scores: ScoreTable, name: str, rows: NDArray[np.int64] | None) -> Fl
     return values if rows is None else values[rows]
 
 
-def _weighted_mean(percentiles: Sequence[Float64Array], weights: Sequence[float], emphasis: int) -> Float64Array:
-    """Power mean over the scores a clip has; NaN where it has none."""
-    total = np.zeros(len(percentiles[0]))
-    weight_of_all = np.zeros(len(percentiles[0]))
-    for values, weight in zip(percentiles, weights, strict=True):
-        known = ~np.isnan(values)
-        total += power(np.where(known, values, 0.0), emphasis) * weight
-        weight_of_all += known * weight
-    mean = np.divide(total, weight_of_all, out=np.full(len(total), np.nan), where=weight_of_all > 0)
-    for _ in range(emphasis.bit_length() - 1):
-        mean = np.sqrt(mean)
-    return mean
+class _PowerMean:
+    """Power mean over the scores a clip has, one score after the other; NaN where it has none."""
+
+    def __init__(self, clips: int, emphasis: int):
+        self._emphasis = emphasis
+        self._total, self._weight = np.zeros(clips), np.zeros(clips)
+
+    def add(self, percentiles: Float64Array, weight: float) -> None:
+        """Count one score."""
+        _add_powers(percentiles, self._emphasis.bit_length() - 1, weight, self._total, self._weight)
+
+    def result(self) -> Float64Array:
+        """The mean of what was counted, float64 [clips]."""
+        known = self._weight > 0
+        mean = np.divide(self._total, self._weight, out=np.full(len(known), np.nan), where=known)
+        for _ in range(self._emphasis.bit_length() - 1):
+            np.sqrt(mean, out=mean)
+        return mean
+
+
+@numba.njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _add_powers(
+    values: Float64Array, squarings: int, weight: float, total: Float64Array, weight_of_all: Float64Array
+) -> None:
+    """Add the powers of what is known, times the weight, in one pass."""
+    for clip in range(len(values)):
+        term = values[clip]
+        if not np.isnan(term):
+            for _ in range(squarings):
+                term *= term
+            total[clip] += term * weight
+            weight_of_all[clip] += weight
 
 
 def power(values: Float64Array, exponent: int) -> Float64Array:

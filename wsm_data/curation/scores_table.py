@@ -156,9 +156,11 @@ def read_scores(
     keys = stored[KEY_COLUMN]
     _require_release(where, found, release_digest, keys, release_keys)
     columns = {}
-    for one in scorers:
+    for one in scorers:  # what was turned into an array is let go: a column of ten million clips is 80 MB
         _require_no_nan(stored[one.name], one, keys, where)
         columns[one.name] = np.asarray(stored[one.name].to_numpy(), np.float64)
+        stored = stored.drop_columns([one.name])
+    del stored
     keys = pa.concat_arrays(keys.chunks) if keys.num_chunks != 1 else keys.chunk(0)
     table = ScoreTable(release_digest=found, scorers=scorers, keys=keys, columns=columns)
     require_sound_values(table, where)

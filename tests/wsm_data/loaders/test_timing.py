@@ -22,9 +22,7 @@ def test_what_was_given_out_does_not_change():
 
 def test_nothing_is_lost_among_threads():
     timing = Timing()
-    threads = [
-        threading.Thread(target=lambda: [timing.add({Part.COLLATE: 1.0}) for _ in range(500)]) for _ in range(4)
-    ]
+    threads = [threading.Thread(target=lambda: [timing.add({Part.COLLATE: 1.0}) for _ in range(500)]) for _ in range(4)]
     for thread in threads:
         thread.start()
     for thread in threads:
