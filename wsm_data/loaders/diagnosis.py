@@ -143,7 +143,10 @@ def _of_checksums(_: LoaderRun, read: ReadConfig, share: float) -> str:
     found = f"Checksums take {share:.0%} of the readers' time"
     if read.verify is Verify.ALWAYS:
         return f"{found}: with read.verify=first each clip is checked once in a process, or try {_more(read)}."
-    return f"{found}, but only until each clip has been read once (read.verify=first): it passes, or try {_more(read)}."
+    return (
+        f"{found}. With read.verify=first it passes once each clip of a local release has been read; single ranges of a "
+        f"remote one are always compared. Or try {_more(read)}."
+    )
 
 
 def _of_collating(_: LoaderRun, read: ReadConfig, share: float) -> str:
