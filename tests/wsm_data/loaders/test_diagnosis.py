@@ -55,7 +55,11 @@ CASES = {
         ReadConfig(verify=Verify.ALWAYS),
         ["Checksums take 60%", "read.verify=first"],
     ),
-    "checksums of first reads": (run(checksum=0.6, store=0.3), ReadConfig(), ["Checksums take 60%", "it passes once each clip of a local release has been read"]),
+    "checksums of first reads": (
+        run(checksum=0.6, store=0.3),
+        ReadConfig(),
+        ["Checksums take 60%", "it passes once each clip of a local release has been read"],
+    ),
     "standardising to float32": (
         run(collate=0.7, store=0.2),
         ReadConfig(),
