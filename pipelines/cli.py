@@ -2,6 +2,7 @@
 
 import errno
 import importlib
+import importlib.util
 import inspect
 import sys
 from collections.abc import Callable, Mapping
@@ -18,7 +19,7 @@ from pipelines.recipe import recipe_summaries
 from pipelines.registry import STAGES, StageEntry
 from wsm_data.curation.audit_finding import Severity
 from wsm_data.curation.split import SplitBy
-from wsm_data.errors import WsmError
+from wsm_data.errors import ConfigError, WsmError
 
 _INTERRUPTED_EXIT_CODE = 130
 
@@ -154,6 +155,13 @@ def _load(module: str) -> Any:
     return importlib.import_module(f"pipelines.commands.{module}")
 
 
+def _require_extra(extra: str, packages: tuple[str, ...]) -> None:
+    """Say which extra brings what a command needs, in place of a traceback of its imports."""
+    missing = [name for name in packages if importlib.util.find_spec(name) is None]
+    if missing:
+        raise ConfigError(f"this command needs {', '.join(missing)}: install wsm with the extra `{extra}`")
+
+
 def _fail(message: str, code: int) -> None:
     typer.echo(f"error: {message}", err=True)
     sys.exit(code)
@@ -284,6 +292,7 @@ def train(
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress bars.")] = False,
 ) -> None:
     """Pretrain the model; on several GPUs: torchrun -m pipelines.cli train ..."""
+    _require_extra("train", ("safetensors", "tensorboard"))
     _load("train").train(release, out, config, assignments, dry_run, quiet)
 
 

@@ -120,6 +120,13 @@ def test_a_wrong_request_ends_with_code_2_before_any_step(release, tmp_path, wor
     assert message in text
 
 
+def test_a_missing_extra_is_named(release, tmp_path, monkeypatch):
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == "tensorboard" else object())
+    code, text = wsm("train", release, "--out", str(tmp_path / "run"))
+    assert code == 2
+    assert "needs tensorboard: install wsm with the extra `train`" in text
+
+
 @pytest.mark.slow
 def test_two_processes_train_the_model_that_one_trains(release, settings, tmp_path):
     """FSDP2 over gloo; pictures are drawn by both. Equal to the rounding of float32 in three steps."""
