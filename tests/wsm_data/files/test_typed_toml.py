@@ -115,7 +115,7 @@ def test_numbers_are_read_back_to_the_bit(number):
         ("grid.cells=[1, 2.5]", "grid.cells takes a whole number, found 2.5"),
         ("cameras=[1]", "cameras takes text in quotes, found 1"),
         ("grids.fine.cell=1", r"unknown key grids.fine.cell; did you mean grids.fine.cells\?"),
-        ("grids=5", "grids is a section, found the value '5'"),
+        ("grids=5", "grids is a section, found the value 5"),
         ("counts.mine=2.5", "counts.mine takes a whole number, found 2.5"),
         ("count=-1", "^count must not be negative, found -1"),
     ],
