@@ -144,8 +144,8 @@ def _of_checksums(_: LoaderRun, read: ReadConfig, share: float) -> str:
     if read.verify is Verify.ALWAYS:
         return f"{found}: with read.verify=first each clip is checked once in a process, or try {_more(read)}."
     return (
-        f"{found}: with read.verify=first it passes once each clip of a local release has been read, while what comes from "
-        f"a URL in ranges is always compared; or try {_more(read)}."
+        f"{found}: with read.verify=first it passes once each clip of a local release has been read, while what comes "
+        f"from a URL in ranges is always compared; or try {_more(read)}."
     )
 
 
