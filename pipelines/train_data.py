@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import torch
 
-from pipelines.train_config import HeldOutConfig, TrainRunConfig
+from pipelines.train_config import TrainRunConfig
 from wsm_data.errors import ConfigError
 from wsm_data.loaders.config import Arrangement, LoaderConfig, OrderConfig, ReadConfig, Remainder, SourceConfig
 from wsm_data.loaders.loader import ClipLoader
@@ -78,8 +78,3 @@ def latent_standard(manifest: ReleaseManifest) -> LatentStandard:
         depth_mean=depth.mean,
         depth_std=depth.std,
     )
-
-
-def held_out_clips(config: HeldOutConfig, loader: ClipLoader) -> int:
-    """How many clips are evaluated."""
-    return min(config.clips, loader.steps)

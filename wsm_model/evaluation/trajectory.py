@@ -23,8 +23,3 @@ def constant_velocity(true_T3: Float64Array, frames: int = 4) -> Float64Array:
     known = min(frames, len(true_T3) - 1)
     step = (true_T3[known] - true_T3[0]) / known if known else np.zeros(3)
     return true_T3[0] + np.arange(len(true_T3))[:, None] * step
-
-
-def mean_velocity(true_T3: Float64Array, step_m: Float64Array) -> Float64Array:
-    """The mean step of the training set, repeated: [T, 3]."""
-    return np.arange(len(true_T3))[:, None] * step_m
