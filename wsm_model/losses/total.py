@@ -1,5 +1,6 @@
 """The pretraining objective (paper, equation 8): L_FM + lambda_d L_d + lambda_p (L_abs + L_rel)."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -27,6 +28,14 @@ class LossConfig:
     pose: float = 0.5
     pose_delta: float = 0.1
     flow_shift: float = 5.0
+
+    def __post_init__(self) -> None:
+        for name in ("depth", "pose"):
+            if not 0 <= getattr(self, name) < math.inf:
+                raise ValueError(f"{name} must be a weight of at least 0, found {getattr(self, name)}")
+        for name in ("pose_delta", "flow_shift"):
+            if not 0 < getattr(self, name) < math.inf:
+                raise ValueError(f"{name} must be above 0, found {getattr(self, name)}")
 
 
 @dataclass(frozen=True, kw_only=True)
