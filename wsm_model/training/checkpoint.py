@@ -88,7 +88,7 @@ def load_checkpoint(
             load(_tensors(model, optimiser), storage_reader=reader, no_dist=world_size == 1)
     except (OSError, RuntimeError, KeyError, ValueError, CheckpointException) as error:
         raise IntegrityError(
-            f"{path} must be a whole checkpoint, but: {error}; delete it to go on from the one before"
+            f"{path} must be a whole checkpoint, but: {_cause(error)}; delete it to go on from the one before"
         ) from error
     return state
 
@@ -125,6 +125,13 @@ def _quiet_alone() -> Iterator[None]:
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="torch.distributed is disabled", category=UserWarning)
         yield
+
+
+def _cause(error: BaseException) -> str:
+    """What went wrong, without the tracebacks of all ranks."""
+    if not isinstance(error, CheckpointException):
+        return str(error)
+    return "; ".join(sorted({str(cause) for cause, _ in error.failures.values()}))
 
 
 def _tensors(model: nn.Module, optimiser: torch.optim.Optimizer) -> dict[str, Tensor]:
