@@ -44,6 +44,16 @@ class HeldOutConfig:
     flow_steps: int = 8
     session: SessionConfig = field(default_factory=SessionConfig)
 
+    def __post_init__(self) -> None:
+        if self.clips < 0 or self.flow_steps < 1:
+            raise ValueError(
+                f"clips must not be negative and flow_steps be at least 1, found {self.clips} and {self.flow_steps}"
+            )
+        if self.max_latents < 0 or self.max_latents == 1:
+            raise ValueError(
+                f"max_latents must be 0, or leave a latent after the anchor: at least 2, found {self.max_latents}"
+            )
+
 
 @dataclass(frozen=True, kw_only=True)
 class TrainRunConfig:
@@ -66,3 +76,16 @@ class TrainRunConfig:
     training: TrainingConfig = field(default_factory=TrainingConfig)
     held_out: HeldOutConfig = field(default_factory=HeldOutConfig)
     codec_weights: str = ""
+
+    def __post_init__(self) -> None:
+        if not self.read.standardise:
+            raise ValueError("read.standardise must be true: the model is made for standardised latents")
+        split, of_held_out = (
+            self.held_out.split,
+            [one for one in self.sources if one.release == self.sources[0].release],
+        )
+        if any(one.split == split or not (one.split or one.selection) for one in of_held_out):
+            raise ValueError(
+                f"held_out.split must name clips that are not trained on, but a source trains on the split {split!r} "
+                f"of {self.sources[0].release}; name another split for one of the two"
+            )
