@@ -16,6 +16,8 @@ from wsm_data.schema.depth import DepthRange
 from wsm_data.view.clip_pictures import spread_frames
 from wsm_data.view.dream_sheet import DreamSheet, draw_dream_sheet
 from wsm_data.view.training_curves import draw_training_curves
+from wsm_model.config import Variant
+from wsm_model.inference.passes import StateEstimate
 from wsm_model.inference.sampler import flow_schedule
 from wsm_model.inference.session import Session
 from wsm_model.losses.pose import raw_frame_poses
@@ -79,6 +81,8 @@ def draw_dream(
 ) -> None:
     """See the first half of a clip, dream a chunk, and draw both beside the truth.
 
+    Without SLAM the true poses of what is seen are given, and there is no depth to draw.
+
     Args:
         model: any number of ranks may call this with the same clip.
         batch: one clip.
@@ -94,8 +98,8 @@ def draw_dream(
     end = min(length, seen + chunk)
     session = Session(model, config.session)
     depth, poses = torch.zeros_like(rgb[:end]), torch.zeros_like(batch.poses[0, :end].float())
-    for latent in rgb[:seen]:
-        states = session.observe(latent[None])
+    for number, latent in enumerate(rgb[:seen]):
+        states = session.observe(latent[None], _issued_poses(model, batch, number))
         place = slice(states.first, states.first + states.poses.shape[1])
         poses[place] = states.poses[0]
         if states.depth is not None:
@@ -105,9 +109,17 @@ def draw_dream(
     if path is None:
         return
     poses[seen:] = dream.states.poses[0]
+    estimated = None
     if dream.states.depth is not None:
-        depth[seen:] = dream.states.depth[0]
-    _draw(path, batch, decoding, title, seen=seen, end=end, dreamed=dream.rgb[0], depth=depth, poses=poses)
+        estimated = torch.cat([depth[:seen], dream.states.depth[0]])
+    _draw(path, batch, decoding, title, seen=seen, end=end, dreamed=dream.rgb[0], depth=estimated, poses=poses)
+
+
+def _issued_poses(model: WorldSlamModel, batch: Batch, latent: int) -> StateEstimate | None:
+    """The true poses of a latent, where the model must be told them."""
+    if model.config.variant is Variant.SLAM:
+        return None
+    return StateEstimate(first=latent, depth=None, poses=batch.poses[:1, latent : latent + 1].float())
 
 
 def _draw(
@@ -119,7 +131,7 @@ def _draw(
     seen: int,
     end: int,
     dreamed: Tensor,
-    depth: Tensor,
+    depth: Tensor | None,
     poses: Tensor,
 ) -> None:
     true_rgb, true_depth = batch.rgb[0, :end].float(), batch.depth[0, :end].float()
@@ -135,7 +147,7 @@ def _draw(
         true_rgb_u8=decoding.rgb_u8(true_rgb)[frames],
         dreamed_rgb_u8=decoding.rgb_u8(with_dream)[frames],
         true_depth_m=decoding.depth_m(true_depth)[frames],
-        estimated_depth_m=decoding.depth_m(depth)[frames],
+        estimated_depth_m=None if depth is None else decoding.depth_m(depth)[frames],
         depth_range=decoding.depth_range,
         true_path_m=true_m,
         estimated_path_m=estimated_m[:first],

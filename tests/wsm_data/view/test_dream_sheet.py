@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from wsm_data.schema.depth import DepthRange
+from wsm_data.view.depth_colours import depth_picture
 from wsm_data.view.dream_sheet import DreamSheet, draw_dream_sheet
 
 
@@ -44,6 +45,15 @@ def test_the_same_sheet_gives_the_same_bytes(tmp_path):
         draw_dream_sheet(sheet(), tmp_path / name)
     draw_dream_sheet(sheet(estimated_depth_m=np.full((3, 24, 40), 1.0, np.float32)), tmp_path / "c")
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes() != (tmp_path / "c").read_bytes()
+
+
+def test_a_model_without_depth_has_no_row_of_estimates(tmp_path):
+    draw_dream_sheet(sheet(estimated_depth_m=np.full((3, 24, 40), 1.0, np.float32)), tmp_path / "with.png")
+    draw_dream_sheet(sheet(estimated_depth_m=None), tmp_path / "without.png")
+    pictures = [cv2.imread(str(tmp_path / name)) for name in ("with.png", "without.png")]
+    colour = tuple(int(x) for x in depth_picture(np.full((1, 1, 1), 1.0, np.float32), DepthRange())[0, 0, 0])
+    shares = [share_of_colour(picture, colour) for picture in pictures]
+    assert shares[1] == pytest.approx(shares[0] / 2, rel=0.05)  # true and estimated are of one colour
 
 
 def test_pictures_of_another_count_are_refused():
