@@ -43,3 +43,12 @@ def test_generation_expert_and_goal_embedding_take_three_tenths(make_model):
 def test_settings_that_make_no_schedule_are_refused(changes):
     with pytest.raises(ValueError, match="must lie in"):
         OptimiserConfig(**changes)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{"beta_1": 1.0}, {"beta_2": -0.1}, {"eps": -1.0}, {"weight_decay": float("nan")}, {"clip_norm": 0.0}],
+)
+def test_settings_that_make_no_optimiser_are_refused_by_name(changes):
+    with pytest.raises(ValueError, match=f"^{next(iter(changes))} must"):
+        OptimiserConfig(**changes)
