@@ -108,7 +108,7 @@ def pretraining_loss(
 
 
 def _sum_where(values: Tensor, counted: Tensor) -> Tensor:
-    """Sum of the values that count; what does not count may be anything, even not finite."""
+    """Sum of the values that count; what does not count changes no sum, even where it is not finite."""
     return torch.where(counted, values, torch.zeros((), device=values.device, dtype=values.dtype)).sum()
 
 
