@@ -7,7 +7,7 @@ depend on which rank or which part of a step a sequence falls to.
 import hashlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import torch
 from torch import Tensor
@@ -31,6 +31,10 @@ class ClipBatch(Protocol):
     @property
     def poses(self) -> Tensor:
         """Pose slots [R, L, M, 7]: xyz (m) and unit quaternion wxyz in the first camera's frame."""
+
+    @property
+    def still(self) -> Tensor:
+        """Slots of still frames that were added at the end of a clip, bool [R, L, M]."""
 
     @property
     def row(self) -> Tensor:
@@ -93,13 +97,16 @@ def spans_of(batch: ClipBatch) -> list[SequenceSpan]:
     ]
 
 
-def training_inputs(batch: ClipBatch, *, seed: int, flow_shift: float, micro_rows: int = 0) -> Iterator[TrainingInputs]:
+def training_inputs(
+    batch: ClipBatch, *, seed: int, flow_shift: float, depth_noise: float = 0.0, micro_rows: int = 0
+) -> Iterator[TrainingInputs]:
     """Noised inputs of a batch, in parts of at most `micro_rows` rows, each cut to its longest row.
 
     Args:
         batch: of a loader.
         seed: of the noise.
         flow_shift: gamma of the flow time.
+        depth_noise: largest share of noise in the depth that later chunks see; see `TrainingConfig`.
         micro_rows: rows of a part; 0: all.
     """
     spans = spans_of(batch)
@@ -108,35 +115,46 @@ def training_inputs(batch: ClipBatch, *, seed: int, flow_shift: float, micro_row
         end = min(rows, first + (micro_rows or rows))
         chosen = [number for number, span in enumerate(spans) if first <= span.row < end]
         if chosen:
-            yield _part(batch, spans, chosen, first, end, seed, flow_shift)
+            yield _part(batch, spans, chosen, first, end, _Noise(seed, flow_shift, depth_noise))
+
+
+class _Noise(NamedTuple):
+    seed: int
+    flow_shift: float
+    depth: float
 
 
 def _part(
-    batch: ClipBatch, spans: Sequence[SequenceSpan], chosen: list[int], first: int, end: int, seed: int, shift: float
+    batch: ClipBatch, spans: Sequence[SequenceSpan], chosen: list[int], first: int, end: int, settings: _Noise
 ) -> TrainingInputs:
     longest = max(spans[number].start + spans[number].length for number in chosen)
     place = (slice(first, end), slice(0, longest))
-    rgb = batch.rgb[place].float()
-    noise = torch.zeros(rgb.shape)
+    rgb, depth = batch.rgb[place].float(), batch.depth[place].float()
+    noise, depth_noise = torch.zeros(rgb.shape), torch.zeros(rgb.shape)
+    depth_share = torch.zeros(rgb.shape[:2])
     flow_time = torch.zeros(rgb.shape[:2])
     moved = []
     for number in chosen:
         span = spans[number]
         own = SequenceSpan(row=span.row - first, start=span.start, length=span.length, chunk_size=span.chunk_size)
         moved.append(own)
-        stream = noise_stream(seed, batch.epoch, batch.step, int(batch.refs[number]))
+        stream = noise_stream(settings.seed, batch.epoch, batch.step, int(batch.refs[number]))
         where = (own.row, slice(own.start, own.start + own.length))
-        flow_time[where] = chunk_flow_times(own, shift, stream)
+        flow_time[where] = chunk_flow_times(own, settings.flow_shift, stream)
         noise[where] = torch.randn(own.length, *rgb.shape[2:], generator=stream)
+        if settings.depth:
+            depth_share[where] = settings.depth * torch.rand((), generator=stream)
+            depth_noise[where] = torch.randn(own.length, *rgb.shape[2:], generator=stream)
     noise, flow_time = noise.to(rgb.device), flow_time.to(rgb.device)
     inputs = ModelInputs(
         rgb=rgb,
-        depth=batch.depth[place].float(),
+        depth=depth,
         poses=batch.poses[place].float(),
         goal_camera0_m=batch.goal_camera0_m[chosen].float(),
         noisy_rgb=noised(rgb, noise, flow_time),
         flow_time=flow_time,
         spans=tuple(moved),
+        depth_context=noised(depth, depth_noise.to(rgb.device), depth_share.to(rgb.device)) if settings.depth else None,
     )
     return TrainingInputs(inputs=inputs, noise=noise, keys=tuple(batch.keys[number] for number in chosen))
 

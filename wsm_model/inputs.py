@@ -17,12 +17,13 @@ class ModelInputs:
 
     Attributes:
         rgb: clean RGB latents, standardised, [B, F, C, h, w].
-        depth: clean depth latents, standardised, [B, F, C, h, w].
+        depth: clean depth latents, standardised, [B, F, C, h, w]; what estimates are compared with.
         poses: poses of the raw frames in the first camera's frame, [B, F, M, 7]: xyz (m), unit quaternion wxyz.
         goal_camera0_m: goal of each sequence in its first camera's frame, [N, 3], m.
         noisy_rgb: noisy RGB latents, [B, F, C, h, w].
         flow_time: tau of each latent, the same within a chunk, [B, F].
         spans: where the sequences stand.
+        depth_context: what later chunks see of the depth, [B, F, C, h, w]; None: the depth itself.
     """
 
     rgb: Tensor
@@ -32,6 +33,7 @@ class ModelInputs:
     noisy_rgb: Tensor
     flow_time: Tensor
     spans: Sequence[SequenceSpan]
+    depth_context: Tensor | None = None
 
     def table(self) -> FrameTable:
         """Sequence, latent and chunk of every frame."""

@@ -76,9 +76,10 @@ class WorldSlamModel(MixtureOfTransformers):
             ],
             dim=1,
         )
+        depth = inputs.depth if inputs.depth_context is None else inputs.depth_context
         values = {
             Expert.GENERATION: torch.stack([inputs.rgb, inputs.noisy_rgb], dim=1),
-            Expert.DEPTH: torch.stack([inputs.depth, torch.zeros_like(inputs.depth)], dim=1),
+            Expert.DEPTH: torch.stack([depth, torch.zeros_like(depth)], dim=1),
             Expert.POSE: torch.stack(
                 [inputs.poses, identity_poses(*inputs.poses.shape[:-1], device=inputs.poses.device)], dim=1
             ),

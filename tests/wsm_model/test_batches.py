@@ -68,6 +68,31 @@ def test_noisy_latents_are_the_latents_and_their_noise_at_their_times(batch):
     torch.testing.assert_close(part.inputs.noisy_rgb, (1 - tau) * part.inputs.rgb + tau * part.noise)
 
 
+def test_later_chunks_see_the_depth_blurred_by_one_share_a_sequence_and_the_rest_stays_as_it_is(batch):
+    (plain,) = parts_of(batch)
+    (part,) = parts_of(batch, depth_noise=0.5)
+    assert plain.inputs.depth_context is None
+    assert torch.equal(part.inputs.depth, batch.depth)
+    assert torch.equal(part.noise, plain.noise)
+    shares = []
+    for span in part.inputs.spans:
+        place = (span.row, slice(span.start, span.start + span.length))
+        seen, depth = part.inputs.depth_context[place].flatten(), batch.depth[place].flatten()
+        shares.append(1 - float(seen @ depth / (depth @ depth)))  # (1 - s) d + s eps, with eps independent of d
+    assert all(-0.1 < share < 0.6 for share in shares)
+    assert max(shares) - min(shares) > 0.05
+    beyond = part.inputs.depth_context[2, 3:]
+    assert torch.equal(beyond, batch.depth[2, 3:])  # padding
+
+
+def test_the_blur_of_a_sequence_does_not_depend_on_its_part(batch):
+    (whole,) = parts_of(batch, depth_noise=1.0)
+    parts = parts_of(batch, depth_noise=1.0, micro_rows=1)
+    for row, part in enumerate(parts):
+        length = part.noise.shape[1]
+        assert torch.equal(part.inputs.depth_context[0], whole.inputs.depth_context[row, :length])
+
+
 def test_a_chunk_has_one_flow_time():
     span = SequenceSpan(row=0, start=0, length=8, chunk_size=3)  # chunks: 0 | 1 2 3 | 4 5 6 | 7
     times = chunk_flow_times(span, SHIFT, torch.Generator().manual_seed(0)).tolist()

@@ -24,7 +24,7 @@ class ClipErrors:
 
     Attributes:
         key: of the clip.
-        ate_m: camera centres of all raw frames, not aligned, m.
+        ate_m: camera centres of the recorded frames, not aligned, m; still frames that were added do not count.
         zero_motion_ate_m: of a camera that stays.
         constant_velocity_ate_m: of a camera that goes on as it truly began.
         depth_mse: of standardised depth latents.
@@ -76,8 +76,9 @@ def clip_errors(model: WorldSlamModel, batch: ClipBatch, config: SessionConfig) 
         place = (span.row, slice(span.start, span.start + span.length))
         depth, poses = estimate_states(model, batch.rgb[place].float(), config)
         true_depth = batch.depth[place].float()
+        recorded = ~batch.still[place].flatten()[-len(raw_frame_poses(poses)) :].cpu()
         estimated, true = (
-            raw_frame_poses(slots.float())[:, :3].double().cpu().numpy() for slots in (poses, batch.poses[place])
+            raw_frame_poses(slots.float().cpu())[recorded, :3].double().numpy() for slots in (poses, batch.poses[place])
         )
         found.append(
             ClipErrors(

@@ -68,6 +68,10 @@ class TrainingConfig:
         seed: of initial weights, noise and flow times.
         precision: arithmetic of matrix products.
         checkpoint_activations: recompute each layer in the backward pass instead of keeping what is inside it.
+        depth_noise: largest share s of noise eps in the depth latents d that later chunks see: of each sequence a
+            share is drawn uniformly up to it, and they see (1 - s) d + s eps. In use they see estimates, and those are
+            not the truth; LingBot-VA, whose teacher forcing the paper follows, blurs what was seen in the same way
+            (paper silent; 0: the truth).
         optimiser: learning rate and moments.
         loss: weights of the parts.
         checkpoint_every: optimiser steps between checkpoints; there is one at the end in any case.
@@ -82,6 +86,7 @@ class TrainingConfig:
     seed: int = 0
     precision: Precision = Precision.BFLOAT16
     checkpoint_activations: bool = False
+    depth_noise: float = 0.0
     optimiser: OptimiserConfig = field(default_factory=OptimiserConfig)
     loss: LossConfig = field(default_factory=LossConfig)
     checkpoint_every: int = 500
@@ -93,6 +98,8 @@ class TrainingConfig:
         for name in ("epochs", "checkpoint_every", "keep_checkpoints", "log_every"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} must be at least 1, found {getattr(self, name)}")
+        if not 0 <= self.depth_noise <= 1:
+            raise ValueError(f"depth_noise must lie in [0, 1], found {self.depth_noise}")
         for name in ("max_steps", "micro_rows", "sample_every", "seed"):
             if getattr(self, name) < 0:
                 raise ValueError(f"{name} must not be negative, found {getattr(self, name)}")

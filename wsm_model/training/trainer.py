@@ -169,7 +169,13 @@ def train_step(
     counts = _global_counts(batch, device)
     sums: dict[str, float] = {}
     bad: list[str] = []
-    parts = training_inputs(batch, seed=config.seed, flow_shift=config.loss.flow_shift, micro_rows=config.micro_rows)
+    parts = training_inputs(
+        batch,
+        seed=config.seed,
+        flow_shift=config.loss.flow_shift,
+        depth_noise=config.depth_noise,
+        micro_rows=config.micro_rows,
+    )
     optimiser.zero_grad(set_to_none=True)
     for part in parts:
         losses = _backward(model, part, config, counts, world_size)

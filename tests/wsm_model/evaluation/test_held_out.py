@@ -17,6 +17,7 @@ def batch(make_poses):
     poses = make_poses(2, 5, 4)
     poses[:, 0] = torch.tensor([0.0, 0, 0, 1, 0, 0, 0])
     return SimpleNamespace(
+        still=torch.zeros(2, 5, 4, dtype=torch.bool),
         rgb=torch.randn(2, 5, 6, 4, 6),
         depth=torch.randn(2, 5, 6, 4, 6),
         poses=poses,
@@ -48,6 +49,16 @@ def test_a_camera_that_stays_where_it_was_has_the_error_of_zero_motion(make_mode
     for one in clip_errors(model, batch, CONFIG):
         assert one.ate_m == pytest.approx(one.zero_motion_ate_m, rel=1e-6)
         assert one.mean_depth_mse == pytest.approx(1.0, abs=0.2)  # standard normal latents
+
+
+def test_still_frames_that_were_added_do_not_count(make_model, batch):
+    model = make_model()
+    batch.still[:, 3:] = True
+    before = clip_errors(model, batch, CONFIG)
+    batch.poses[:, 3:, :, :3] += 7.0
+    for one, other in zip(before, clip_errors(model, batch, CONFIG), strict=True):
+        assert (one.ate_m, one.zero_motion_ate_m) == (other.ate_m, other.zero_motion_ate_m)
+        assert one.constant_velocity_ate_m == other.constant_velocity_ate_m
 
 
 def test_copying_is_exact_where_nothing_changes_and_the_unconditional_guess_is_right_on_average(make_model, batch):
