@@ -32,3 +32,9 @@ def xxh3_64(data: bytes | memoryview) -> str:
 def xxh3_128(data: bytes | memoryview) -> str:
     """Return the 128-bit xxh3 digest that identifies the content of a source frame, in hexadecimal."""
     return str(xxhash.xxh3_128_hexdigest(data))
+
+
+def xxh3_128_file(path: Path) -> str:
+    """Return the 128-bit xxh3 digest of a file in hexadecimal, reading it in pieces: as fast as a disk."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, xxhash.xxh3_128).hexdigest()

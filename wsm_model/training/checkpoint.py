@@ -2,7 +2,8 @@
 
 A checkpoint is a folder `step-000500`. Its `state.json` is written last: a folder without it is unfinished and is
 passed over. It says the step, the state of the loader and what the tensors must fit, so a run goes on exactly where it
-was, on as many ranks as are there now. Nothing is pickled.
+was, on as many ranks as are there now. Files of tensors are vouched for by `digests-00000.json`, one for each rank that
+wrote. Nothing is pickled.
 """
 
 import json
@@ -23,6 +24,7 @@ from torch.distributed.checkpoint.state_dict_saver import save
 
 from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.files.atomic import write_text
+from wsm_data.files.digest import xxh3_128_file
 from wsm_data.files.jsonlines import canonical_json
 from wsm_model.ranks import rank_and_world_size, wait_for_all
 
@@ -62,6 +64,9 @@ def save_checkpoint(folder: Path, model: nn.Module, optimiser: torch.optim.Optim
     with _quiet_alone():
         save(_tensors(model, optimiser), storage_writer=writer, no_dist=world_size == 1)
     wait_for_all()
+    own = {file.name: xxh3_128_file(file) for file in sorted(path.glob("*.safetensors"))[rank::world_size]}
+    write_text(path / f"digests-{rank:05d}.json", canonical_json(own) + "\n")
+    wait_for_all()
     if rank == 0:
         record = {"step": state.step, "loader": dict(state.loader), "identity": dict(state.identity)}
         write_text(path / _STATE, canonical_json(record) + "\n")
@@ -81,8 +86,9 @@ def load_checkpoint(
     state = read_state(path)
     _require_same(path, dict(state.identity), dict(identity))
     _prepare_moments(model, optimiser, state.step)
-    _, world_size = rank_and_world_size()
+    rank, world_size = rank_and_world_size()
     try:
+        _require_sound(path, rank, world_size)
         reader = HuggingFaceStorageReader(str(path))
         with _quiet_alone():
             load(_tensors(model, optimiser), storage_reader=reader, no_dist=world_size == 1)
@@ -91,6 +97,18 @@ def load_checkpoint(
             f"{path} must be a whole checkpoint, but: {_cause(error)}; delete it to go on from the one before"
         ) from error
     return state
+
+
+def _require_sound(path: Path, rank: int, world_size: int) -> None:
+    """Every rank compares its share of the files with their digests."""
+    digests = {}
+    for file in path.glob("digests-*.json"):
+        digests |= json.loads(file.read_text())
+    if not digests:
+        raise ValueError("it has no digests of its tensors")
+    for name in sorted(digests)[rank::world_size]:
+        if xxh3_128_file(path / name) != digests[name]:
+            raise ValueError(f"{name} does not have the digest that was written with it")
 
 
 def read_state(path: Path) -> TrainingState:

@@ -11,6 +11,7 @@ from safetensors import safe_open
 from safetensors.torch import load_file, save_file
 
 from wsm_data.errors import ConfigError, IntegrityError
+from wsm_data.files.digest import xxh3_128_file
 from wsm_model.training.checkpoint import (
     TrainingState,
     checkpoints,
@@ -145,14 +146,37 @@ def drop_tensor(path: Path) -> None:
     save_file(tensors, path, metadata=about)
 
 
+def drop_tensor_and_vouch_for_it(path: Path) -> None:
+    drop_tensor(path)
+    (digests,) = path.parent.glob("digests-*.json")
+    digests.write_text(json.dumps({path.name: xxh3_128_file(path)}))
+
+
+def flip_a_byte_of_a_tensor(path: Path) -> None:
+    data = bytearray(path.read_bytes())
+    data[-5] ^= 1
+    path.write_bytes(data)
+
+
+def drop_digests(path: Path) -> None:
+    for file in path.parent.glob("digests-*.json"):
+        file.unlink()
+
+
+CHANGED = "does not have the digest that was written with it"
+
+
 @pytest.mark.parametrize(
     ("damage", "cause"),
     [
-        (cut_tail, "file not fully covered"),
-        (cut_header, "invalid header length"),
-        (spoil_header, "invalid UTF-8 in header"),
-        (drop_tensor, r"Missing key in checkpoint state_dict: model\.goal\.linear_1\.bias"),
-        (Path.unlink, ""),
+        (cut_tail, CHANGED),
+        (cut_header, CHANGED),
+        (spoil_header, CHANGED),
+        (flip_a_byte_of_a_tensor, CHANGED),
+        (drop_tensor, CHANGED),
+        (drop_tensor_and_vouch_for_it, r"Missing key in checkpoint state_dict: model\.goal\.linear_1\.bias"),
+        (Path.unlink, "No such file or directory"),
+        (drop_digests, "it has no digests of its tensors"),
     ],
 )
 def test_damaged_tensors_are_refused_in_one_line_that_names_folder_and_cause(saved, make_run, damage, cause):
