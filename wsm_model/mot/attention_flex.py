@@ -13,6 +13,8 @@ from wsm_model.mot.attention import Attended, JointTokens, flatten_tokens, unfla
 from wsm_model.mot.chunks import FrameTable
 from wsm_model.mot.mask import allowed, rule_matrix, token_table
 
+_LENGTHS = 256
+
 
 def block_mask(config: ModelConfig, table: FrameTable, device: torch.device) -> BlockMask:
     """The mask of `dense_mask` in blocks: what is empty as a whole is skipped, what is full needs no test."""
@@ -38,10 +40,16 @@ def block_mask(config: ModelConfig, table: FrameTable, device: torch.device) -> 
 def attend_flexibly(tokens: JointTokens, mask: BlockMask) -> Attended:
     """Joint attention under a block mask; compiled on a GPU, interpreted elsewhere."""
     queries, keys, values = (flatten_tokens([part[i] for part in tokens.values()]) for i in range(3))
-    attend = _compiled() if queries.is_cuda else cast(Callable[..., Tensor], flex_attention)
+    attend = compiled() if queries.is_cuda else cast(Callable[..., Tensor], flex_attention)
     return unflatten_tokens(attend(queries, keys, values, block_mask=mask), tokens)
 
 
 @cache
-def _compiled() -> Callable[..., Tensor]:
-    return torch.compile(flex_attention, dynamic=False)
+def compiled(backend: str = "inductor") -> Callable[..., Tensor]:
+    """flex_attention, compiled once for each number and length of rows.
+
+    Beyond its limit of recompilations (8), torch would fall back without a word to a form that stores all L x L scores.
+    The limit is raised to the lengths a run may have, and beyond that it is an error.
+    """
+    torch._dynamo.config.recompile_limit = max(_LENGTHS, torch._dynamo.config.recompile_limit)
+    return torch.compile(flex_attention, dynamic=False, fullgraph=True, backend=backend)

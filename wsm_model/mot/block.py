@@ -9,7 +9,7 @@ width of a head, S tokens of the context.
 
 import torch
 from torch import Tensor, nn
-from torch.nn.functional import layer_norm, scaled_dot_product_attention
+from torch.nn.functional import layer_norm, rms_norm, scaled_dot_product_attention
 
 from wsm_model.config import Expert, ModelConfig, Variant
 from wsm_model.layers.modulation import gated_sum, modulated_norm
@@ -45,11 +45,11 @@ class Projections(nn.Module):
 
     def queries(self, x: Tensor) -> Tensor:
         """Queries [..., H, d] of tokens [..., D]."""
-        return self.norm_q(self.to_q(x)).unflatten(-1, (self.heads, -1))
+        return _normed(self.norm_q, self.to_q(x)).unflatten(-1, (self.heads, -1))
 
     def keys(self, x: Tensor) -> Tensor:
         """Keys [..., H, d] of tokens."""
-        return self.norm_k(self.to_k(x)).unflatten(-1, (self.heads, -1))
+        return _normed(self.norm_k, self.to_k(x)).unflatten(-1, (self.heads, -1))
 
     def values(self, x: Tensor) -> Tensor:
         """Values [..., H, d] of tokens."""
@@ -144,3 +144,8 @@ class ExpertBlock(nn.Module):
         three = modulation[..., first : first + 3, :] + self.table[first : first + 3].float()
         shift, scale, gate = three.unbind(-2)
         return shift, scale, gate
+
+
+def _normed(norm: nn.RMSNorm, x: Tensor) -> Tensor:
+    """The norm in float32, rounded once to the dtype of x."""
+    return rms_norm(x.float(), norm.normalized_shape, norm.weight.float(), norm.eps).to(x.dtype)

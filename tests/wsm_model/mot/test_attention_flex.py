@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from wsm_model.config import Variant
-from wsm_model.mot.attention_flex import block_mask
+from wsm_model.mot.attention_flex import block_mask, compiled
 from wsm_model.mot.chunks import SequenceSpan, frame_table
 from wsm_model.mot.mask import dense_mask
 
@@ -46,6 +46,17 @@ def test_blocks_that_are_skipped_are_empty_and_blocks_that_are_not_tested_are_fu
     assert torch.equal((partial | full)[:, :count, :count], holds_any)
     assert torch.equal(full[:, :count, :count], holds_all)
     assert not holds_any.all()  # some are skipped
+
+
+def test_more_lengths_than_torch_would_compile_by_itself_stay_compiled(config):
+    """Beyond its limit, torch's own fall-back would store all scores of all pairs."""
+    attend = compiled(backend="eager")
+    for frames in range(1, 12):
+        mask = block_mask(
+            config, frame_table([SequenceSpan(row=0, start=0, length=frames, chunk_size=2)], 1, frames), CPU
+        )
+        tokens = torch.randn(1, 1, mask.seq_lengths[0], 16)
+        assert attend(tokens, tokens, tokens, block_mask=mask).shape == tokens.shape
 
 
 def listed(counts: torch.Tensor, indices: torch.Tensor) -> torch.Tensor:
