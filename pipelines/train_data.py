@@ -39,14 +39,17 @@ def training_loader(
 
 
 def held_out_loader(config: TrainRunConfig, device: torch.device) -> ClipLoader | None:
-    """Clips of the first source that are not trained on, one by one; None where its release has none."""
+    """Clips of the first source that are not trained on, one by one; None where its release has none.
+
+    They come in an order of their own, always the same, so that a few of them are not all of one scene.
+    """
     held_out, source = config.held_out, config.sources[0]
     manifest = open_release(source.release).manifest
     if not manifest.clips_by_split.get(held_out.split):
         _LOG.warning("release %s has no clips of the split %r: nothing is held out", manifest.name, held_out.split)
         return None
     order = OrderConfig(
-        shuffle=False,
+        shuffle=True,
         global_batch=1,
         remainder=Remainder.DROP,
         arrangement=Arrangement.PLAIN,

@@ -34,6 +34,7 @@ from wsm_data.shards.release import open_release
 from wsm_model.model import WorldSlamModel
 from wsm_model.model_file import ModelCard, load_model, save_model
 from wsm_model.ranks import leave_ranks, rank_and_world_size, shard_model, start_ranks, unsharded, wait_for_all
+from wsm_model.training.checkpoint import checkpoints
 from wsm_model.training.metrics import metrics_writer
 from wsm_model.training.schedule import make_optimiser
 from wsm_model.training.trainer import Hooks, resume, total_steps, train
@@ -71,7 +72,12 @@ def identity_of(config: TrainRunConfig, loader: ClipLoader) -> dict[str, object]
     training = {
         name: value for name, value in dataclasses.asdict(config.training).items() if name not in _NOT_PART_OF_A_RUN
     }
-    parts = {"model": dataclasses.asdict(config.model), "training": training, "steps_of_an_epoch": loader.steps}
+    parts = {
+        "model": dataclasses.asdict(config.model),
+        "training": training,
+        "dtype_of_latents": config.read.dtype,
+        "steps_of_an_epoch": loader.steps,
+    }
     return dict(_dotted(json.loads(json.dumps(parts))))
 
 
@@ -82,10 +88,14 @@ def _run(config: TrainRunConfig, out: Path, device: torch.device, quiet: bool) -
         torch.manual_seed(config.training.seed)
         model = WorldSlamModel(model_config(config, release.manifest), config.model.attention).to(device)
         identity = identity_of(config, loader)
-        _start_folder(config, out, model)
+        if config.model.weights and not checkpoints(out / "checkpoints"):
+            _fill_with_wan(config, out, model)
         shard_model(model, device)
         optimiser = make_optimiser(model, config.training.optimiser)
         done = resume(out / "checkpoints", model, optimiser, loader, identity)
+        if rank == 0:  # only now is it certain that the folder is this run's
+            out.mkdir(parents=True, exist_ok=True)
+            write_text(out / "run.json", json.dumps(dataclasses.asdict(config), indent=1, sort_keys=True) + "\n")
         with _hooks(config, out, model, done, total_steps(config.training, loader), device, quiet) as hooks:
             train(
                 model,
@@ -110,17 +120,14 @@ def _run(config: TrainRunConfig, out: Path, device: torch.device, quiet: bool) -
     return _evaluate(config, out, device, quiet)
 
 
-def _start_folder(config: TrainRunConfig, out: Path, model: WorldSlamModel) -> None:
-    """Write the settings, and fill a new run's model with pretrained weights where they were asked for."""
+def _fill_with_wan(config: TrainRunConfig, out: Path, model: WorldSlamModel) -> None:
+    """Start from pretrained weights, and say what became of each tensor."""
+    report = load_wan_weights(model, config.model.weights)
     rank, _ = rank_and_world_size()
     if rank == 0:
         out.mkdir(parents=True, exist_ok=True)
-        write_text(out / "run.json", json.dumps(dataclasses.asdict(config), indent=1, sort_keys=True) + "\n")
-    if config.model.weights:
-        report = load_wan_weights(model, config.model.weights)
-        if rank == 0:
-            write_text(out / "weights.json", json.dumps(dataclasses.asdict(report), indent=1) + "\n")
-            tqdm.write(report.summary())
+        write_text(out / "weights.json", json.dumps(dataclasses.asdict(report), indent=1) + "\n")
+        tqdm.write(report.summary())
 
 
 @contextmanager
@@ -146,21 +153,21 @@ def _hooks(
 
 
 def _sampler(config: TrainRunConfig, out: Path, model: WorldSlamModel, device: torch.device) -> Any:
-    """What draws the first held-out clip, and the curves, after a step."""
+    """What draws the first held-out clip, and the curves, after a step; what it needs is opened now."""
+    if not config.training.sample_every:
+        return _ignore
     rank, _ = rank_and_world_size()
-    batch: list[Batch] = []
+    batch, decoding = _first_held_out(config, device), _decoding(config)
 
     def sample(step: int) -> None:
-        if not batch:
-            batch.append(_first_held_out(config, device))
         was_training = model.training
         model.eval()
         path = out / "samples" / f"step-{step:06d}.png" if rank == 0 else None
         with unsharded(model):
             draw_dream(
                 model,
-                batch[0],
-                _decoding(config),
+                batch,
+                decoding,
                 config.held_out,
                 path,
                 shift=config.training.loss.flow_shift,
@@ -214,5 +221,5 @@ def _dotted(parts: Mapping[str, Any], where: str = "") -> Iterator[tuple[str, ob
             yield dotted, value
 
 
-def _ignore(step: int, values: Mapping[str, float]) -> None:
-    del step, values
+def _ignore(*_values: object) -> None:
+    pass

@@ -129,7 +129,7 @@ def test_a_release_without_statistics_has_no_standard(tiny, statistics):
         latent_standard(manifest(tiny, **{statistics: NO_STATISTICS}))
 
 
-def test_held_out_clips_come_one_by_one_in_order_and_cut(run_config, tiny):
+def test_held_out_clips_come_one_by_one_and_cut(run_config, tiny):
     config = run_config(held_out=HeldOutConfig(max_latents=2))
     with held_out_loader(config, CPU) as loader:
         batches = list(loader)

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from matplotlib.ticker import NullFormatter
 
 from wsm_data.files.atomic import write_bytes
 from wsm_data.schema.arrays import Float64Array
@@ -49,6 +50,13 @@ def draw_training_curves(records: Sequence[Mapping[str, object]], units: Mapping
             axes.set(title=name.replace("_", " "), xlabel="optimiser step (count)", ylabel=units[name])
             if (values > 0).all() and values.max() > 8 * values.min():
                 axes.set_yscale("log")
+                axes.yaxis.set_major_formatter(_short)
+                axes.yaxis.set_minor_formatter(NullFormatter())
             axes.grid(axis="y")
         figure.tight_layout()
         write_bytes(path, figure_png(figure))
+
+
+def _short(value: float, _place: int) -> str:
+    """A power of ten as a plain number: formulas are not typeset, since a scene may be called `$x$`."""
+    return f"{value:g}"

@@ -97,6 +97,21 @@ def test_another_model_in_the_same_folder_is_refused_by_field(run):
     assert again.code == 2
     assert "model.variant: 'slam' in the checkpoint, 'idm' now" in again.text
     assert again.kept == first.kept
+    assert json.loads((first.out / "run.json").read_text())["model"]["variant"] == "slam"
+
+
+def test_latents_of_another_dtype_in_the_same_folder_are_refused(run):
+    run()
+    again = run("read.dtype=bfloat16")
+    assert again.code == 2
+    assert "dtype_of_latents: 'float32' in the checkpoint, 'bfloat16' now" in again.text
+
+
+def test_pictures_of_a_split_without_clips_are_refused_before_the_first_step(run):
+    done = run("training.sample_every=2", "held_out.split=val")
+    assert done.code == 2, done.text
+    assert "pictures need a clip of the split 'val'" in done.text
+    assert not (done.out / "checkpoints").exists()
 
 
 def test_a_damaged_checkpoint_ends_with_code_4_and_once_it_is_deleted_the_one_before_leads_to_the_same_model(run):

@@ -1,5 +1,6 @@
 """A source of analytic rooms, and the stages over it, one at a time."""
 
+import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,6 +20,7 @@ from pipelines.stages.index import IndexConfig
 from pipelines.stages.map import MapConfig
 from pipelines.stages.pack import PackConfig
 from pipelines.stages.report import ReportConfig
+from pipelines.stages.score import ScoreConfig
 from pipelines.stages.split import SplitConfig
 from pipelines.stages.verify import VerifyConfig
 from wsm_data.files.jsonlines import read_lines
@@ -164,3 +166,18 @@ def mapped(make_pipeline):
     pipeline = make_pipeline()
     pipeline.run_to("map")
     return pipeline
+
+
+@pytest.fixture(scope="session")
+def scored(tmp_path_factory: pytest.TempPathFactory, finished: Pipeline) -> Path:
+    """A release with its scores; nobody writes into it."""
+    folder = tmp_path_factory.mktemp("scored") / "release"
+    shutil.copytree(finished.release, folder)
+    run_stage(load_stage("score"), ScoreConfig(release=str(folder)), folder.with_name("score"), RunOptions(quiet=True))
+    return folder
+
+
+@pytest.fixture
+def release(scored: Path, tmp_path: Path) -> Path:
+    """A copy of it."""
+    return Path(shutil.copytree(scored, tmp_path / "release"))

@@ -1,16 +1,13 @@
 """`wsm select` from the command line, with its report and the selection as a release of its own."""
 
 import re
-import shutil
 
 import pytest
 from typer.testing import CliRunner
 
 from pipelines.cli import app
-from pipelines.registry import load_stage
 from pipelines.runner import RunOptions, run_stage
 from pipelines.stages.materialise import STAGE, MaterialiseConfig
-from pipelines.stages.score import ScoreConfig
 from pipelines.stages.verify import require_sound
 from wsm_data.errors import ConfigError
 from wsm_data.shards.manifest import release_digest
@@ -18,19 +15,6 @@ from wsm_data.shards.release import open_release
 from wsm_data.shards.selection import read_selection
 
 QUIET = RunOptions(quiet=True)
-
-
-@pytest.fixture(scope="module")
-def scored(tmp_path_factory, finished):
-    folder = tmp_path_factory.mktemp("scored") / "release"
-    shutil.copytree(finished.release, folder)
-    run_stage(load_stage("score"), ScoreConfig(release=str(folder)), folder.with_name("score"), QUIET)
-    return folder
-
-
-@pytest.fixture
-def release(scored, tmp_path):
-    return shutil.copytree(scored, tmp_path / "release")
 
 
 @pytest.fixture

@@ -24,20 +24,6 @@ from wsm_data.shards.selection import parse_selection, read_selection
 QUIET = RunOptions(quiet=True)
 
 
-@pytest.fixture(scope="module")
-def scored(tmp_path_factory, finished):
-    """A release with its scores."""
-    folder = tmp_path_factory.mktemp("scored") / "release"
-    shutil.copytree(finished.release, folder)
-    run_stage(load_stage("score"), ScoreConfig(release=str(folder)), folder.with_name("score"), QUIET)
-    return folder
-
-
-@pytest.fixture
-def release(scored, tmp_path):
-    return shutil.copytree(scored, tmp_path / "release")
-
-
 @pytest.fixture
 def select(release, tmp_path):
     def go(out="select", options=QUIET, **changes):
