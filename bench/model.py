@@ -12,8 +12,11 @@ import statistics
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
+import numpy as np
 from reporting import machine, machine_line, table, write_results
 
 ROUNDS = 3
@@ -43,6 +46,31 @@ def _latents(*shape: int):
     return torch.randn(*shape, 48, *_LATENT_CELLS, generator=torch.Generator().manual_seed(0))
 
 
+def _seconds(work: Callable[[], None]) -> float:
+    start = time.perf_counter()
+    work()
+    return time.perf_counter() - start
+
+
+def _operations(work: Callable[[], None]) -> dict[str, float]:
+    """Floating-point operations of all matrix products, and of those in attention, in units of 1e9."""
+    import torch
+    from torch.utils.flop_counter import FlopCounterMode, sdpa_backward_flop_count, sdpa_flop_count
+
+    # torch counts its GPU kernels of attention; the one on a CPU takes the same first arguments.
+    on_cpu = {
+        torch.ops.aten._scaled_dot_product_flash_attention_for_cpu: lambda *shapes, **_: sdpa_flop_count(*shapes[:3]),
+        torch.ops.aten._scaled_dot_product_flash_attention_for_cpu_backward: lambda *shapes, **_: (
+            sdpa_backward_flop_count(*shapes[:4])
+        ),
+    }
+    with FlopCounterMode(display=False, custom_mapping=on_cpu) as counter:
+        work()
+    counts = counter.get_flop_counts()["Global"]
+    attention = sum(count for name, count in counts.items() if "attention" in str(name))
+    return {"gflop": sum(counts.values()) / 1e9, "attention_gflop": attention / 1e9}
+
+
 def training_step(attention: str, latents: int) -> dict[str, float]:
     """Seconds of a step and the growth of peak memory, in this process."""
     import torch
@@ -50,11 +78,9 @@ def training_step(attention: str, latents: int) -> dict[str, float]:
     from wsm_model.inputs import ModelInputs
     from wsm_model.layers.pose import identity_poses
     from wsm_model.losses.total import LossConfig, pretraining_loss
-    from wsm_model.mot.attention_blocks import plan_blocks
     from wsm_model.mot.chunks import SequenceSpan
 
     model, rgb = _model(attention), _latents(1, latents)
-    spans = (SequenceSpan(row=0, start=0, length=latents, chunk_size=CHUNK),)
     inputs = ModelInputs(
         rgb=rgb,
         depth=rgb,
@@ -62,37 +88,16 @@ def training_step(attention: str, latents: int) -> dict[str, float]:
         goal_camera0_m=torch.zeros(1, 3),
         noisy_rgb=rgb,
         flow_time=torch.full((1, latents), 0.5),
-        spans=spans,
+        spans=(SequenceSpan(row=0, start=0, length=latents, chunk_size=CHUNK),),
     )
-    before_kb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    times = []
-    for _ in range(2):  # the first pays for what is allocated once
-        start = time.perf_counter()
+
+    def step() -> None:
         pretraining_loss(inputs, model(inputs), rgb, LossConfig()).total.backward()
-        times.append(time.perf_counter() - start)
+
+    before_kb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    seconds = min(_seconds(step) for _ in range(2))  # the first pays for what is allocated once
     grown_kb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before_kb
-    length = 2 * latents * sum(model.config.tokens.values())
-    pairs = length**2 if attention == "dense" else _pairs(model.config, plan_blocks(model.config, spans, rgb.device))
-    return {"seconds": min(times), "memory_mb": grown_kb / 1024, "pairs": pairs}
-
-
-def _pairs(config, plan) -> int:
-    """Pairs of tokens that the blocks evaluate."""
-    from wsm_model.mot.mask import TokenKind
-
-    rgb, state = config.patches, config.patches + config.pose_slots
-    tokens = {
-        TokenKind.CLEAN_RGB: rgb,
-        TokenKind.NOISY_RGB: rgb,
-        TokenKind.CLEAN_STATE: state,
-        TokenKind.STATE_QUERY: state,
-    }
-    return sum(
-        (block.frames.stop - block.frames.start)
-        * tokens[block.kind]
-        * sum((place.stop - place.start) * tokens[kind] for kind, place in block.seen)
-        for block in plan[0].blocks
-    )
+    return {"seconds": seconds, "memory_mb": grown_kb / 1024, **_operations(step)}
 
 
 def planning_steps(history: int) -> dict[str, float]:
@@ -115,13 +120,14 @@ def planning_steps(history: int) -> dict[str, float]:
         session.observe(seen[:, history])
         session.dream(goal, noise, schedule)
 
-    session = observed(history)
-    start = time.perf_counter()
-    plan(session)
-    cached = time.perf_counter() - start
-    start = time.perf_counter()
-    plan(observed(history))
-    return {"cached": cached, "recomputed": time.perf_counter() - start}
+    def recompute() -> None:
+        plan(observed(history))
+
+    found: dict[str, float] = {}
+    for name, prepare in (("cached", lambda: partial(plan, observed(history))), ("recomputed", lambda: recompute)):
+        found[name] = min(_seconds(prepare()) for _ in range(2))
+        found[f"{name}_gflop"] = _operations(prepare())["gflop"]
+    return found
 
 
 def in_new_process(*words: str) -> dict[str, float]:
@@ -154,40 +160,15 @@ def spread(ratios: list[float]) -> str:
 
 def page(found: dict[str, dict[str, list[dict[str, float]]]]) -> list[str]:
     training, planning = found["training"], found["planning"]
-    rows = []
-    for latents in TRAINING_LATENTS:
-        blocks, dense = training[f"blocks {latents}"], training[f"dense {latents}"]
-        ratios = [slow["seconds"] / fast["seconds"] for slow, fast in zip(dense, blocks, strict=True)]
-        rows.append(
-            [
-                str(latents),
-                f"{middle(blocks, 'seconds'):.3f}",
-                f"{middle(dense, 'seconds'):.3f}",
-                spread(ratios),
-                f"{middle(dense, 'pairs') / middle(blocks, 'pairs'):.2f} x",
-                f"{middle(blocks, 'memory_mb'):.0f}",
-                f"{middle(dense, 'memory_mb'):.0f}",
-            ]
-        )
-    steps = []
-    for history in HISTORY_LATENTS:
-        runs = planning[str(history)]
-        ratios = [run["recomputed"] / run["cached"] for run in runs]
-        steps.append(
-            [
-                str(history),
-                f"{1e3 * middle(runs, 'cached'):.0f}",
-                f"{1e3 * middle(runs, 'recomputed'):.0f}",
-                spread(ratios),
-            ]
-        )
+    height, width = _LATENT_CELLS
     return [
         "# The model: what the structure of the mask and the cache are worth",
         "",
-        f"Two layers of the size `tiny`, latents of {_LATENT_CELLS[0]} x {_LATENT_CELLS[1]} cells, chunks of {CHUNK}, "
-        f"float32, one thread, every measurement in a process of its own; medians of {ROUNDS} interleaved rounds.",
+        f"Two layers of the size `tiny`, latents of {height} x {width} cells, chunks of {CHUNK}, float32, one thread, "
+        f"every measurement in a process of its own; medians of {ROUNDS} interleaved rounds, with the range of the "
+        "ratios. Operations are those of all matrix products, as torch counts them.",
         "",
-        "## A training step",
+        "## A training step: blocks of the mask (what runs on a CPU) beside the dense matrix",
         "",
         *table(
             [
@@ -195,17 +176,70 @@ def page(found: dict[str, dict[str, list[dict[str, float]]]]) -> list[str]:
                 "blocks, s",
                 "dense, s",
                 "dense takes",
-                "dense evaluates pairs",
+                "blocks, GFLOP",
+                "dense, GFLOP",
+                "of attention",
                 "blocks, MB",
                 "dense, MB",
             ],
-            rows,
+            [training_row(latents, training) for latents in TRAINING_LATENTS],
         ),
         "",
         f"## A planning step: one latent observed, {CHUNK} dreamed in {DREAM_STEPS} steps, their states estimated",
         "",
-        *table(["latents seen before", "with the cache, ms", "recomputed, ms", "recomputing takes"], steps),
+        *table(
+            [
+                "latents seen before",
+                "with the cache, ms",
+                "recomputed, ms",
+                "recomputing takes",
+                "with the cache, GFLOP",
+                "recomputed, GFLOP",
+            ],
+            [planning_row(history, planning[str(history)]) for history in HISTORY_LATENTS],
+        ),
+        "",
+        growth(planning),
     ]
+
+
+def training_row(latents: int, training: dict[str, list[dict[str, float]]]) -> list[str]:
+    blocks, dense = training[f"blocks {latents}"], training[f"dense {latents}"]
+    attention = middle(dense, "attention_gflop") / middle(blocks, "attention_gflop")
+    return [
+        str(latents),
+        f"{middle(blocks, 'seconds'):.3f}",
+        f"{middle(dense, 'seconds'):.3f}",
+        spread([slow["seconds"] / fast["seconds"] for slow, fast in zip(dense, blocks, strict=True)]),
+        f"{middle(blocks, 'gflop'):.1f}",
+        f"{middle(dense, 'gflop'):.1f}",
+        f"{attention:.2f} x",
+        f"{middle(blocks, 'memory_mb'):.0f}",
+        f"{middle(dense, 'memory_mb'):.0f}",
+    ]
+
+
+def planning_row(history: int, runs: list[dict[str, float]]) -> list[str]:
+    return [
+        str(history),
+        f"{1e3 * middle(runs, 'cached'):.0f}",
+        f"{1e3 * middle(runs, 'recomputed'):.0f}",
+        spread([run["recomputed"] / run["cached"] for run in runs]),
+        f"{middle(runs, 'cached_gflop'):.2f}",
+        f"{middle(runs, 'recomputed_gflop'):.2f}",
+    ]
+
+
+def growth(planning: dict[str, list[dict[str, float]]]) -> str:
+    """A line through the times of a cached step, and how far the worst of them lies from it."""
+    history = np.array(HISTORY_LATENTS, float)
+    times_ms = np.array([1e3 * middle(planning[str(latents)], "cached") for latents in HISTORY_LATENTS])
+    slope_ms, start_ms = np.polyfit(history, times_ms, 1)
+    off = np.abs(times_ms - (start_ms + slope_ms * history)) / times_ms
+    return (
+        f"The cached step grows linearly: {start_ms:.0f} ms + {slope_ms:.2f} ms a latent seen before; the farthest of "
+        f"the {len(history)} times lies {100 * off.max():.0f} % off that line."
+    )
 
 
 def main() -> None:
