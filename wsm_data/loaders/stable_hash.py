@@ -6,6 +6,7 @@ Number Generators, OOPSLA 2014), which maps 64-bit words one to one.
 """
 
 from enum import IntEnum
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -49,10 +50,16 @@ def mix64(values: NDArray[np.integer], *words: int) -> Uint64Array:
         values: non-negative integers of any shape.
         words: what the hashes depend on besides, such as seed and epoch; their order counts.
     """
+    return splitmix64(values.astype(np.uint64) ^ _key(words))
+
+
+@lru_cache(maxsize=64)
+def _key(words: tuple[int, ...]) -> Uint64Array:
+    """What the words come to; uint64 [1]."""
     key = np.zeros(1, np.uint64)
     for word in words:
         key = splitmix64(key ^ np.uint64(word))
-    return splitmix64(values.astype(np.uint64) ^ key)
+    return key
 
 
 def permutation(hashes: Uint64Array, group_sizes: Int64Array | None = None) -> Int64Array:

@@ -2,8 +2,8 @@
 
 import logging
 import threading
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
@@ -12,7 +12,7 @@ import torch
 
 from wsm_data.errors import ConfigError
 from wsm_data.loaders.arrangement import ArrangedClip, arrange, batch_layout, describe, slots_of
-from wsm_data.loaders.batch import LATENT_DTYPES, LATENT_TENSORS, BatchLayout, PackedBatch
+from wsm_data.loaders.batch import LATENT_DTYPES, LATENT_TENSORS, PackedBatch
 from wsm_data.loaders.buffers import BufferPool
 from wsm_data.loaders.clip_places import clip_places, span_of
 from wsm_data.loaders.clip_reads import read_clip
@@ -20,10 +20,11 @@ from wsm_data.loaders.config import ReadConfig
 from wsm_data.loaders.local_shards import LocalShards
 from wsm_data.loaders.open_shards import open_shards
 from wsm_data.loaders.plan import EpochPlan, chunk_sizes
+from wsm_data.loaders.prefetch import done_alone
 from wsm_data.loaders.shard_reader import ShardReader
 from wsm_data.loaders.source_table import Sources
 from wsm_data.loaders.standardise import convert, standardisations
-from wsm_data.loaders.timing import Part, Stopwatch
+from wsm_data.loaders.timing import Part, Stopwatch, total_seconds
 from wsm_data.loaders.verification import verification_of
 
 _LOG = logging.getLogger(__name__)
@@ -97,19 +98,16 @@ class StepReader:
             reader.expect([span_of(place) for place in places if self._readers[place.source] is reader])
 
     def read(self, plan: EpochPlan, step: int) -> PackedBatch:
-        """Read what this rank has of a step.
+        """Read what this rank has of a step, in the thread of the caller; errors are those of `StepWork`."""
+        return done_alone(self.begin(plan, step))
 
-        Raises:
-            IntegrityError: the bytes of a clip are not those that the release vouches for; names shard and clip.
-            StoreError: a store failed for good.
-            OSError: the system refuses to read.
-        """
+    def begin(self, plan: EpochPlan, step: int) -> "StepWork":
+        """Lay out what this rank has of a step, in memory that is taken for it."""
         watch = Stopwatch()
         with watch.measure(Part.COLLATE):
             rows = plan.rows(step, self._rank, self._world_size)
             refs = np.concatenate(rows)
             clips = arrange(rows, clip_places(self._sources, refs), plan)
-            drawn = chunk_sizes(refs, plan.order, plan.epoch)
             layout = batch_layout(clips, len(rows), plan, self._latent_shape, self._dtype)
             packed = PackedBatch(
                 block=self._pool.take(layout.size_bytes),
@@ -117,31 +115,28 @@ class StepReader:
                 keys=tuple(clip.place.key for clip in clips),
                 epoch=plan.epoch,
                 step=step,
-                seconds=watch.seconds,
             )
-            memory = memoryview(packed.block.numpy())
-            targets = packed.tensors() if self._converts else {}
-        goals = [self._read_clip(layout, targets, memory, clip, watch) for clip in clips]
-        with watch.measure(Part.COLLATE):
-            describe(layout, memory, clips, refs=refs, chunk_size=drawn, goals=goals)
-        return packed
+            work = StepWork(
+                packed=packed,
+                clips=clips,
+                refs=refs,
+                chunk_size=chunk_sizes(refs, plan.order, plan.epoch),
+                memory=memoryview(packed.block.numpy()),
+                targets=packed.tensors() if self._converts else {},
+                read_clip=self._read_clip,
+            )
+        work.watches.append(watch)
+        return work
 
     def close(self) -> None:
         """Give back files, threads and connections."""
         for reader in self._readers:
             reader.close()
 
-    def _read_clip(
-        self,
-        layout: BatchLayout,
-        targets: Mapping[str, torch.Tensor],
-        memory: memoryview,
-        clip: ArrangedClip,
-        watch: Stopwatch,
-    ) -> np.ndarray:
+    def _read_clip(self, work: "StepWork", clip: ArrangedClip, watch: Stopwatch) -> np.ndarray:
         """Read one clip into the batch; returns the last camera position, float32 [3]."""
         place = clip.place
-        slots = slots_of(layout, memory, clip)
+        slots = slots_of(work.packed.layout, work.memory, clip)
         staged = self._staged(clip) if self._converts else {}
         slots |= {name: memoryview(latents.numpy()).cast("B") for name, latents in staged.items()}
         due = self._verification.is_due(place.source, place.number)
@@ -151,7 +146,7 @@ class StepReader:
             self._verification.passed(place.source, place.number)
         for name, latents in staged.items():
             with watch.measure(Part.COLLATE):
-                out = targets[name][clip.row, clip.start : clip.start + clip.latents]
+                out = work.targets[name][clip.row, clip.start : clip.start + clip.latents]
                 convert(latents, out, self._standardise.get(name))
         return last_pose[:3]
 
@@ -163,6 +158,59 @@ class StepReader:
         if held is None or len(held) < size:
             held = self._staging.held = torch.empty(size, dtype=_STORED)
         return dict(zip(LATENT_TENSORS, held[:size].view(shape), strict=True))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StepWork:
+    """What one rank has of a step, to be read clip by clip, in any order and by several threads at the same time.
+
+    Attributes:
+        packed: the batch to be.
+        clips: what is read into it.
+        refs: numbers of the clips; int64 [N].
+        chunk_size: chunk size of each; int64 [N].
+        memory: block of the batch, as bytes.
+        targets: tensors of the batch by name, where what is read is not yet what is delivered.
+        read_clip: reads a clip into this; gives the last camera position.
+        goals: what it gave, by number of the clip.
+        watches: seconds of all that was done.
+    """
+
+    packed: PackedBatch
+    clips: Sequence[ArrangedClip]
+    refs: np.ndarray
+    chunk_size: np.ndarray
+    memory: memoryview
+    targets: Mapping[str, torch.Tensor]
+    read_clip: "Callable[[StepWork, ArrangedClip, Stopwatch], np.ndarray]"
+    goals: dict[int, np.ndarray] = field(default_factory=dict)
+    watches: list[Stopwatch] = field(default_factory=list)
+
+    @property
+    def parts(self) -> int:
+        """Clips."""
+        return len(self.clips)
+
+    def make(self, part: int) -> None:
+        """Read a clip.
+
+        Raises:
+            IntegrityError: its bytes are not those that the release vouches for; names shard and clip.
+            StoreError: a store failed for good.
+            OSError: the system refuses to read.
+        """
+        watch = Stopwatch()
+        self.goals[part] = self.read_clip(self, self.clips[part], watch)
+        self.watches.append(watch)
+
+    def complete(self) -> PackedBatch:
+        """Describe what was read; the batch is whole then."""
+        watch = Stopwatch()
+        with watch.measure(Part.COLLATE):
+            goals = [self.goals[part] for part in range(self.parts)]
+            layout, packed = self.packed.layout, self.packed
+            describe(layout, self.memory, self.clips, refs=self.refs, chunk_size=self.chunk_size, goals=goals)
+        return replace(packed, seconds=total_seconds([*self.watches, watch]))
 
 
 def _open_readers(sources: Sources, read: ReadConfig) -> Sequence[ShardReader]:

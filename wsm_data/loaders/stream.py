@@ -1,14 +1,16 @@
 """Batches of some steps, in order: read by threads, by worker processes, or by whoever asks for them."""
 
 from collections.abc import Callable, Generator, Sequence
+from dataclasses import dataclass
+from functools import partial
 from itertools import chain, islice, repeat
-from typing import TypeVar
+from typing import Generic, TypeVar
 
 from wsm_data.loaders.batch import PackedBatch
 from wsm_data.loaders.config import ReadConfig, RemoteAccess
 from wsm_data.loaders.plan import EpochPlan
-from wsm_data.loaders.prefetch import Prefetch
-from wsm_data.loaders.step_reader import StepReader
+from wsm_data.loaders.prefetch import Prefetch, Work, done_alone
+from wsm_data.loaders.step_reader import StepReader, StepWork
 from wsm_data.loaders.timing import Part, Stopwatch, Timing
 from wsm_data.loaders.worker_processes import StepDataset, read_in_processes
 
@@ -44,25 +46,45 @@ def open_stream(
         timing: adds up the time of all parts.
         inline: read in the caller's thread, whatever the settings say.
     """
-
-    def finished(packed: PackedBatch) -> Delivered:
-        watch = Stopwatch()
-        with watch.measure(Part.TRANSFER):
-            delivered = transfer(packed)
-        timing.add(packed.seconds)
-        timing.add(watch.seconds)
-        return delivered
-
     announce = _announcer(reader, plan, steps, read)
 
-    def read_step(step: int) -> Delivered:
-        return finished(reader.read(plan, step))
+    def begin(step: int) -> _BatchWork[Delivered]:
+        return _BatchWork(reader.begin(plan, step), transfer, timing)
 
     if read.workers and not inline:
-        return _by_processes(StepDataset(reader, plan), steps, read, finished)
+        return _by_processes(StepDataset(reader, plan), steps, read, partial(_finished, transfer, timing))
     if read.threads and not inline:
-        return Prefetch(iter(steps), read_step, announce, threads=read.threads, depth=read.prefetch_batches)
-    return _one_by_one(steps, read_step, announce)
+        return Prefetch(iter(steps), begin, announce, threads=read.threads, depth=read.prefetch_batches)
+    return _one_by_one(steps, begin, announce)
+
+
+@dataclass(frozen=True)
+class _BatchWork(Generic[Delivered]):
+    """A batch in parts: its clips."""
+
+    step: StepWork
+    transfer: Callable[[PackedBatch], Delivered]
+    timing: Timing
+
+    @property
+    def parts(self) -> int:
+        return self.step.parts
+
+    def make(self, part: int) -> None:
+        self.step.make(part)
+
+    def complete(self) -> Delivered:
+        return _finished(self.transfer, self.timing, self.step.complete())
+
+
+def _finished(transfer: Callable[[PackedBatch], Delivered], timing: Timing, packed: PackedBatch) -> Delivered:
+    """Make of a batch what is delivered, and count the time of all its parts."""
+    watch = Stopwatch()
+    with watch.measure(Part.TRANSFER):
+        delivered = transfer(packed)
+    timing.add(packed.seconds)
+    timing.add(watch.seconds)
+    return delivered
 
 
 def _announcer(reader: StepReader, plan: EpochPlan, steps: Sequence[int], read: ReadConfig) -> Callable[[int], None]:
@@ -80,11 +102,11 @@ def _announcer(reader: StepReader, plan: EpochPlan, steps: Sequence[int], read: 
 
 
 def _one_by_one(
-    steps: Sequence[int], read_step: Callable[[int], Delivered], announce: Callable[[int], None]
+    steps: Sequence[int], begin: Callable[[int], Work[Delivered]], announce: Callable[[int], None]
 ) -> Generator[Delivered, None, None]:
     for step in steps:
         announce(step)
-        yield read_step(step)
+        yield done_alone(begin(step))
 
 
 def _by_processes(

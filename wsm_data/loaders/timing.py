@@ -2,7 +2,7 @@
 
 import threading
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from enum import StrEnum
 
@@ -37,7 +37,7 @@ class Timing:
 
 
 class Stopwatch:
-    """Measures the parts of one batch, in one thread."""
+    """Measures the parts of some work, in one thread."""
 
     def __init__(self) -> None:
         self.seconds = dict.fromkeys(Part, 0.0)
@@ -50,3 +50,12 @@ class Stopwatch:
             yield
         finally:
             self.seconds[part] += time.perf_counter() - start
+
+
+def total_seconds(watches: Iterable[Stopwatch]) -> dict[Part, float]:
+    """Seconds of several threads, added up by part."""
+    total = dict.fromkeys(Part, 0.0)
+    for watch in watches:
+        for part, seconds in watch.seconds.items():
+            total[part] += seconds
+    return total

@@ -2,8 +2,6 @@
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from wsm_data.loaders.config import ReadConfig, Verify
 from wsm_data.loaders.open_shards import reads_again_what_it_read
 from wsm_data.loaders.source_table import SourceTable
@@ -23,7 +21,7 @@ class Verification:
         bits = [
             clips if policy is Verify.FIRST else 0 for policy, clips in zip(policies, clips_of_sources, strict=True)
         ]
-        self._checked = [np.zeros(-(-clips // 8), np.uint8) for clips in bits]
+        self._checked = [bytearray(-(-clips // 8)) for clips in bits]
 
     def is_due(self, source: int, number: int) -> bool:
         """Whether a clip, by its source and its number there, must be checked when it is read."""
@@ -34,7 +32,7 @@ class Verification:
     def passed(self, source: int, number: int) -> None:
         """Note that a clip was checked and found whole."""
         if self._policies[source] is Verify.FIRST:
-            self._checked[source][number >> 3] |= np.uint8(1 << (number & 7))
+            self._checked[source][number >> 3] |= 1 << (number & 7)
 
 
 def verification_of(tables: Sequence[SourceTable], read: ReadConfig) -> Verification:

@@ -45,6 +45,8 @@ class RowBlocks:
         with self._lock:
             blocks = [self._block(number, read) for number in numbers.tolist()]
         at = place * _BLOCK_ROWS + rows % _BLOCK_ROWS  # only the last block of an index may be shorter
+        if len(blocks) == 1:
+            return [values[at] for values in blocks[0]]
         return [np.concatenate(parts)[at] for parts in zip(*blocks, strict=True)]
 
     def _block(self, number: int, read: ReadRows) -> Block:

@@ -25,7 +25,7 @@ def test_first_checks_each_clip_of_each_source_until_it_passed():
 
 
 def test_one_bit_is_kept_for_a_clip():
-    assert sum(bits.nbytes for bits in Verification([Verify.FIRST], [1_000_001])._checked) == 125_001
+    assert sum(len(bits) for bits in Verification([Verify.FIRST], [1_000_001])._checked) == 125_001
 
 
 def test_sources_have_policies_of_their_own():
