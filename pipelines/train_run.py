@@ -138,7 +138,7 @@ def _hooks(
     rank, _ = rank_and_world_size()
     sample = _sampler(config, out, model, device)
     if rank:
-        yield Hooks(metrics=_ignore, sample=sample, progress=lambda _done: None)
+        yield Hooks(metrics=lambda _step, _values: None, sample=sample, progress=lambda _done: None)
         return
     with (
         metrics_writer(out, done) as write,
@@ -155,7 +155,7 @@ def _hooks(
 def _sampler(config: TrainRunConfig, out: Path, model: WorldSlamModel, device: torch.device) -> Any:
     """What draws the first held-out clip, and the curves, after a step; what it needs is opened now."""
     if not config.training.sample_every:
-        return _ignore
+        return lambda _step: None
     rank, _ = rank_and_world_size()
     batch, decoding = _first_held_out(config, device), _decoding(config)
 
@@ -219,7 +219,3 @@ def _dotted(parts: Mapping[str, Any], where: str = "") -> Iterator[tuple[str, ob
             yield from _dotted(value, f"{dotted}.")
         else:
             yield dotted, value
-
-
-def _ignore(*_values: object) -> None:
-    pass

@@ -57,6 +57,6 @@ def draw_training_curves(records: Sequence[Mapping[str, object]], units: Mapping
         write_bytes(path, figure_png(figure))
 
 
-def _short(value: float, _place: int) -> str:
+def _short(value: float, _place: float) -> str:
     """A power of ten as a plain number: formulas are not typeset, since a scene may be called `$x$`."""
     return f"{value:g}"

@@ -101,7 +101,7 @@ def load_checkpoint(
 
 def _require_sound(path: Path, rank: int, world_size: int) -> None:
     """Every rank compares its share of the files with their digests."""
-    digests = {}
+    digests: dict[str, str] = {}
     for file in path.glob("digests-*.json"):
         digests |= json.loads(file.read_text())
     if not digests:
