@@ -53,7 +53,7 @@ def run_training(config: TrainRunConfig, out: Path, *, quiet: bool) -> str | Non
         quiet: no progress bar.
 
     Returns:
-        The table of errors on held-out clips, on the first rank; None where there are none, or elsewhere.
+        The table of errors on held-out clips, empty where there are none, on the first rank; None elsewhere.
 
     Raises:
         ConfigError: the settings do not fit the releases, or the folder belongs to another run.
@@ -117,7 +117,7 @@ def _run(config: TrainRunConfig, out: Path, device: torch.device, quiet: bool) -
     if rank:
         return None
     draw_curves(out)
-    return _evaluate(config, out, device, quiet)
+    return _evaluate(config, out, device, quiet) or ""
 
 
 def _fill_with_wan(config: TrainRunConfig, out: Path, model: WorldSlamModel) -> None:

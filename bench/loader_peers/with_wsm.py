@@ -24,8 +24,8 @@ class Opened:
 
     def epoch(self) -> Iterator[Batch]:
         for batch in self._loader:
-            full = len(batch.refs) == len(batch.rgb)
-            rows = slice(None) if full else batch.row  # rows without a clip fill the last step
+            clips = len(batch.refs)  # rows without a clip fill the last step
+            rows = slice(clips) if batch.row.tolist() == list(range(clips)) else batch.row
             poses = batch.poses.view(len(batch.poses), 4 * LATENTS, 7)[rows, IDENTITY_SLOTS:]
             if poses.shape[1] != FRAMES:
                 raise ValueError(f"a clip must have {FRAMES} poses, found {poses.shape}")

@@ -95,9 +95,12 @@ class Process:
         self._loader = self._contestant.open(_setting(setting))
         self._loader.restore(saved)
         batches = iter(self._loader.epoch())
-        rest = arrays.numbers(next(batches))
+        batch = next(batches)
         seconds = time.perf_counter() - start
-        return {"seconds": seconds, "rest": rest + [number for batch in batches for number in arrays.numbers(batch)]}
+        return {
+            "seconds": seconds,
+            "rest": arrays.numbers(batch) + [number for batch in batches for number in arrays.numbers(batch)],
+        }
 
 
 def _setting(values: dict[str, object]) -> Setting:

@@ -48,6 +48,7 @@ def train(
     table = run_training(built, out, quiet=quiet)
     if table:
         typer.echo(table)
+    if table is not None:
         typer.echo(f"model: {out / 'model'}\ncurves: {out / 'curves.png'}")
 
 

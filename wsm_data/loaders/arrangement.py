@@ -127,10 +127,9 @@ def _clear(layout: BatchLayout, memory: memoryview, row: int, end: int) -> None:
 
 def _stretch(layout: BatchLayout, name: str, row: int, start: int, latents: int) -> slice:
     """Bytes of some latents of a row in a tensor."""
-    place = layout.tensors[name]
-    row_stride, latent_stride = place.strides[:2]
-    first = place.offset + (row * row_stride + start * latent_stride) * place.dtype.itemsize
-    return slice(first, first + latents * latent_stride * place.dtype.itemsize)
+    offset, of_row, of_latent = layout.strides_bytes[name]
+    first = offset + row * of_row + start * of_latent
+    return slice(first, first + latents * of_latent)
 
 
 def _array(layout: BatchLayout, memory: memoryview, name: str) -> np.ndarray:

