@@ -69,8 +69,8 @@ class TrainingConfig:
         precision: arithmetic of matrix products.
         checkpoint_activations: recompute each layer in the backward pass instead of keeping what is inside it.
         depth_noise: largest share s of noise eps in the depth latents d that later chunks see: of each sequence a
-            share is drawn uniformly up to it, and they see (1 - s) d + s eps. In use they see estimates, which are not the
-            truth (paper silent; 0: the truth, its teacher forcing).
+            share is drawn uniformly up to it, and they see (1 - s) d + s eps. In use they see estimates, which are not
+            the truth (paper silent; 0: the truth, its teacher forcing).
         optimiser: learning rate and moments.
         loss: weights of the parts.
         checkpoint_every: optimiser steps between checkpoints; there is one at the end in any case.
