@@ -57,35 +57,32 @@ def require(name: str, found: dict[str, Any], expected: dict[str, int]) -> None:
         raise ValueError(f"{name} must deliver {expected}, found {found}")
 
 
-def first_batches(contest: Contest, rounds: int) -> dict[str, list[float]]:
-    """Seconds from the imports to the first batch, shuffled, each in a process of its own."""
-    seconds: dict[str, list[float]] = {name: [] for name in RESUMED}
-    for _ in range(rounds):
-        for name in RESUMED:
-            with contest.fresh(name) as child:
-                answer = child.ask("first", **contest.setting(name, shuffle=True, processes=False))
-            seconds[name].append(answer["seconds"])
-    return seconds
+def first_batches(
+    contest: Contest, rounds: int, folder: str
+) -> tuple[dict[str, list[float]], dict[str, dict[str, Any]]]:
+    """Seconds from the imports to the first batch, shuffled: of an epoch, and of what is left of one in its middle.
 
-
-def resumed(contest: Contest, rounds: int, folder: str) -> dict[str, dict[str, Any]]:
-    """Seconds from the imports to the first batch after a place in mid-epoch, and what came after it."""
+    Both in turn, each in a process of its own; and what came after the place that was resumed from.
+    """
+    fresh: dict[str, list[float]] = {name: [] for name in RESUMED}
     results: dict[str, dict[str, Any]] = {}
-    for name in RESUMED:
+    settings = {name: contest.setting(name, shuffle=True, processes=False) for name in RESUMED}
+    for name, setting in settings.items():
         with contest.fresh(name) as child:
-            child.ask("open", **contest.setting(name, shuffle=True, processes=False))
+            child.ask("open", **setting)
             left = child.ask("leave", steps=STEPS_BEFORE_RESUMING, state=f"{folder}/{name}")
         results[name] = {"seconds": [], "left": left}
     for _ in range(rounds):
         for name, result in results.items():
             with contest.fresh(name) as child:
-                setting = contest.setting(name, shuffle=True, processes=False)
-                answer = child.ask("resume", state=f"{folder}/{name}", **setting)
+                fresh[name].append(child.ask("first", **settings[name])["seconds"])
+            with contest.fresh(name) as child:
+                answer = child.ask("resume", state=f"{folder}/{name}", **settings[name])
             result["seconds"].append(answer["seconds"])
             result["continued"] = continued(**result["left"], found=answer["rest"])
     for result in results.values():
         del result["left"]
-    return results
+    return fresh, results
 
 
 def continued(delivered: list[int], rest: list[int], found: list[int]) -> dict[str, object]:
@@ -109,12 +106,8 @@ def run(cache: Path, rounds: int) -> dict[str, Any]:
                 memory = {name: contest.running(name).ask("memory") for name in names if name not in LIMITS}
         processes.close()
         print("first batches", file=sys.stderr)
-        return {
-            "clips_per_s": rates,
-            "memory_mb": memory,
-            "first_batch_s": first_batches(contest, rounds),
-            "resumed": resumed(contest, rounds, folder),
-        }
+        first, resumed = first_batches(contest, rounds, folder)
+        return {"clips_per_s": rates, "memory_mb": memory, "first_batch_s": first, "resumed": resumed}
 
 
 def main() -> None:
