@@ -117,7 +117,7 @@ def _run(config: TrainRunConfig, out: Path, device: torch.device, quiet: bool) -
     if rank:
         return None
     draw_curves(out)
-    return _evaluate(config, out, device, quiet) or ""
+    return _evaluate(config, out, device, quiet)
 
 
 def _fill_with_wan(config: TrainRunConfig, out: Path, model: WorldSlamModel) -> None:
@@ -201,10 +201,10 @@ def _decoding(config: TrainRunConfig) -> Decoding:
     )
 
 
-def _evaluate(config: TrainRunConfig, out: Path, device: torch.device, quiet: bool) -> str | None:
+def _evaluate(config: TrainRunConfig, out: Path, device: torch.device, quiet: bool) -> str:
     loader = held_out_loader(config, device) if config.held_out.clips else None
     if loader is None:
-        return None
+        return ""
     with loader:
         standard = latent_standard(loader.sources.tables[0].release.manifest)
         model, _ = load_model(out / "model", standard)

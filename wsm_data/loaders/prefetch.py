@@ -86,7 +86,7 @@ class Prefetch(Generic[Result]):
             self._pending.popleft()
             self._wanted = self._depth
             self._fill()
-        except BaseException:
+        except BaseException:  # an error of a step, or an interrupt while it is waited for
             self._drop()
             raise
         return result
@@ -160,8 +160,8 @@ class _Shared(Generic[Result]):
                     self._work = self._begin(self._step)
                     self._parts = iter(range(self._work.parts))
             work = self._work
-            while work is not None and (part := next(self._parts, -1)) >= 0:
+            while work is not None and not self._is_over and (part := next(self._parts, -1)) >= 0:
                 work.make(part)
-        except BaseException as error:
+        except BaseException as error:  # kept with its part, and raised again
             self._errors[part], self._parts = error, _NO_PARTS
             raise

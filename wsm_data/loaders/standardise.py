@@ -4,7 +4,7 @@ The result is (x - mean) * (1 / std) with each operation rounded to float32, the
 same bits on every processor and with any number of threads.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,16 +24,12 @@ class Standardisation:
     """Mean and scale of one kind of latents.
 
     Attributes:
-        mean: float32 [C, 1, 1], or for every cell [C, h, w].
-        scale: 1 / standard deviation, likewise.
+        mean: float32 [C, 1, 1].
+        scale: 1 / standard deviation; float32 [C, 1, 1].
     """
 
     mean: torch.Tensor
     scale: torch.Tensor
-
-    def over(self, shape: Sequence[int]) -> "Standardisation":
-        """The same with a number for every cell, [C, h, w]: whole latents are faster to go through than channels."""
-        return Standardisation(mean=self.mean.expand(*shape).contiguous(), scale=self.scale.expand(*shape).contiguous())
 
     def whole(self, latents: torch.Tensor, dtype: torch.dtype) -> torch.Tensor:
         """Standardise latents [..., C, h, w] on their own device, into new memory."""
@@ -52,13 +48,12 @@ def convert(stored: torch.Tensor, out: torch.Tensor, standardisation: Standardis
     block = max(1, _SERIAL_ELEMENTS // max(1, stored[:1].numel()))
     direct = out.dtype is torch.float32
     work = torch.empty((0 if direct else block, *out.shape[1:]), dtype=torch.float32)
-    whole = standardisation and standardisation.over(out.shape[1:])
     for source, target in zip(stored.split(block), out.split(block), strict=True):
         values = target if direct else work[: len(source)]
         values.copy_(source)
-        if whole is not None:
-            values.sub_(whole.mean)
-            values.mul_(whole.scale)
+        if standardisation is not None:
+            values.sub_(standardisation.mean)
+            values.mul_(standardisation.scale)
         if not direct:
             target.copy_(values)
 

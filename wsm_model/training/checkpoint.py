@@ -92,7 +92,7 @@ def load_checkpoint(
         reader = HuggingFaceStorageReader(str(path))
         with _quiet_alone():
             load(_tensors(model, optimiser), storage_reader=reader, no_dist=world_size == 1)
-    except (OSError, RuntimeError, KeyError, ValueError, CheckpointException) as error:
+    except (OSError, RuntimeError, KeyError, TypeError, ValueError, CheckpointException) as error:
         raise IntegrityError(
             f"{path} must be a whole checkpoint, but: {_cause(error)}; delete it to go on from the one before"
         ) from error
@@ -104,8 +104,8 @@ def _require_sound(path: Path, rank: int, world_size: int) -> None:
     digests: dict[str, str] = {}
     for file in path.glob("digests-*.json"):
         digests |= json.loads(file.read_text())
-    if not digests:
-        raise ValueError("it has no digests of its tensors")
+    if unvouched := sorted(file.name for file in path.glob("*.safetensors") if file.name not in digests):
+        raise ValueError(f"there is no digest of {', '.join(unvouched)}")
     for name in sorted(digests)[rank::world_size]:
         if xxh3_128_file(path / name) != digests[name]:
             raise ValueError(f"{name} does not have the digest that was written with it")

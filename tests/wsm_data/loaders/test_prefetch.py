@@ -154,6 +154,26 @@ def test_a_closed_stream_is_at_its_end():
     assert next(stream, None) is None
 
 
+def test_of_a_step_that_is_dropped_no_further_part_is_made():
+    """Also where its beginning was underway: closing waits for the part in hand, not for the step."""
+    begun, go_on = threading.Event(), threading.Event()
+    reading = Reading(parts=50)
+
+    def begin(step: int) -> Step:
+        if step == 1:
+            begun.set()
+            assert go_on.wait(timeout=10)
+        return reading.begin(step)
+
+    stream = Prefetch(iter(range(5)), begin, reading.announce, threads=1, depth=1)
+    next(stream)
+    assert begun.wait(timeout=10)
+    stream._drop()
+    go_on.set()
+    stream.close()
+    assert not [part for step, part in reading.made if step == 1]
+
+
 def test_threads_end_when_nobody_refers_to_the_stream_any_more():
     stream = _prefetch(Reading(), 100, threads=2, depth=3)
     next(stream)
