@@ -27,6 +27,7 @@ from generated_index import generate_release
 from planted_homes import KINDS, planted_pair
 from reporting import machine, machine_line, table, write_results
 
+from wsm_data.access.release import open_release
 from wsm_data.curation.path_outline import PATH_POINTS, Outlines
 from wsm_data.curation.quotas import column_codes
 from wsm_data.curation.rule import GEOMETRY_WEIGHTS
@@ -36,7 +37,6 @@ from wsm_data.curation.scores_table import ScoreTable, write_scores
 from wsm_data.files.digest import sha256_file
 from wsm_data.shards.manifest import release_digest
 from wsm_data.shards.names import SCORES_NAME
-from wsm_data.shards.release import open_release
 from wsm_data.shards.selection import read_selection
 
 TRAJECTORIES = 85_000

@@ -18,10 +18,10 @@ import numpy as np
 from generated_index import generate_release
 from reporting import machine, machine_line, table, write_results
 
-from wsm_data.loaders.clip_places import clip_places
 from wsm_data.loaders.config import Arrangement, OrderConfig, SourceConfig
-from wsm_data.loaders.plan import EpochPlan, chunk_sizes, plan_epoch
-from wsm_data.loaders.source_table import Sources, open_sources
+from wsm_data.loaders.order.epoch_plan import EpochPlan, chunk_sizes, plan_epoch
+from wsm_data.loaders.reading.clip_places import clip_places
+from wsm_data.loaders.sources.clips import Sources, open_sources
 from wsm_data.shards.names import INDEX_NAME
 
 CLIPS = (10_000, 100_000, 1_000_000, 10_000_000)

@@ -14,8 +14,8 @@ import numpy as np
 from reporting import machine, machine_line, table, write_results
 
 from wsm_data.files.jsonlines import canonical_json, line_appender
-from wsm_data.loaders.ledger import LedgerWriter
-from wsm_data.loaders.ledger_files import STEP, framed
+from wsm_data.loaders.ledger.files import STEP, framed
+from wsm_data.loaders.ledger.writer import LedgerWriter
 
 CLIPS = 8  # of a rank's step
 STEP_BYTES = CLIPS * 2_000_000  # latents of a median clip

@@ -19,10 +19,10 @@ import cv2
 import numpy as np
 from reporting import machine, machine_line, table, write_results
 
-from pipelines.engines.local import run_local
 from pipelines.recipe import Recipe, stage_config
-from pipelines.runner import RunOptions, run_stage
-from pipelines.stage import Outcome, StageContext, Unit
+from pipelines.running.engines.local import run_local
+from pipelines.running.runner import RunOptions, run_stage
+from pipelines.running.stage import Outcome, StageContext, Unit
 from pipelines.stages import encode, index
 from pipelines.stages import map as map_stage
 from wsm_data.codecs.dct import DctCodec

@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import ndimage
 
-from pipelines.clip_config import ClipConfig
-from pipelines.scene_view import view_scene
+from wsm_data.clips.config import ClipConfig
+from wsm_data.clips.scene_view import view_scene
 from wsm_data.curation.scorers.trajectory import Trajectory, map_with
 from wsm_data.errors import DataError
 from wsm_data.maps.scene_map import SceneMap, build_scene_map

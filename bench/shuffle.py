@@ -22,8 +22,8 @@ import numpy as np
 from reporting import RESULTS, machine, machine_line, table, write_results
 
 from wsm_data.loaders.config import OrderConfig
-from wsm_data.loaders.order import SourceLayout
-from wsm_data.loaders.plan import plan_epoch
+from wsm_data.loaders.order.epoch_plan import plan_epoch
+from wsm_data.loaders.order.pass_order import SourceLayout
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt  # after the choice of a backend without a screen

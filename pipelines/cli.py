@@ -14,9 +14,9 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from pipelines.engines.choice import EngineName
 from pipelines.recipe import recipe_summaries
 from pipelines.registry import STAGES, StageEntry
+from pipelines.running.engines.choice import EngineName
 from wsm_data.curation.audit_finding import Severity
 from wsm_data.curation.split import SplitBy
 from wsm_data.errors import ConfigError, WsmError
@@ -108,7 +108,7 @@ _OPTIONS: dict[str, tuple[Any, Any]] = {
     "quiet": (Annotated[bool, typer.Option("--quiet", "-q", help="No progress bars.")], False),
 }
 """The options of every command that runs stages: annotation and default. A test holds the defaults to those of
-`pipelines.runner.RunOptions`, which is not imported here: `wsm --help` would wait for it."""
+`pipelines.running.runner.RunOptions`, which is not imported here: `wsm --help` would wait for it."""
 
 _OUT_OPTIONAL = (
     Annotated[

@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from pipelines.config import input_fields, merge
-from pipelines.layout import release_folder
+from pipelines.artifacts.layout import release_folder
 from pipelines.registry import STAGES, load_stage
+from pipelines.running.settings import input_fields, merge
 from wsm_data.errors import ConfigError
 from wsm_data.files.typed_toml import build_config, convert, did_you_mean, load_toml
 

@@ -15,9 +15,9 @@ import pipelines.cli
 import pipelines.stages.encode
 import pipelines.stages.index
 import pipelines.stages.map  # noqa: F401 - only to be loaded, as the three above
-from pipelines.clip_config import ClipConfig
-from pipelines.scene_view import view_scene
 from wsm_data.checks.depth_pairs import depth_pair, relative_errors
+from wsm_data.clips.config import ClipConfig
+from wsm_data.clips.scene_view import view_scene
 from wsm_data.codecs.clip_video import depth_video, rgb_video
 from wsm_data.codecs.dct import DctCodec
 from wsm_data.codecs.depth import valid_share

@@ -10,7 +10,7 @@ import torch
 from loader_peers.arrays import BATCH, CLIP_BYTES, Batch
 from loader_peers.contestant import SEED, Contestant, Setting
 from loader_peers.release import write_release
-from wsm_data.shards.release import open_release
+from wsm_data.access.release import open_release
 
 
 class Pread:

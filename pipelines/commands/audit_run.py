@@ -6,10 +6,10 @@ from pathlib import Path
 import typer
 
 from wsm_data.errors import ConfigError, IntegrityError
-from wsm_data.loaders.audit_run import EpochAudit, audit_epochs, sightings
-from wsm_data.loaders.ledger_sources import open_recorded_sources, recorded_order, refs_of_key
-from wsm_data.loaders.ledger_timeline import Timeline, read_timeline, steps_text
-from wsm_data.loaders.source_table import Sources
+from wsm_data.loaders.ledger.audit import EpochAudit, audit_epochs, sightings
+from wsm_data.loaders.ledger.sources import open_recorded_sources, recorded_order, refs_of_key
+from wsm_data.loaders.ledger.timeline import Timeline, read_timeline, steps_text
+from wsm_data.loaders.sources.clips import Sources
 from wsm_data.view.text_table import aligned
 
 

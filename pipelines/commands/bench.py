@@ -5,11 +5,11 @@ from dataclasses import dataclass, field, replace
 
 import typer
 
-from pipelines.config import merge, parse_assignments
+from pipelines.running.settings import merge, parse_assignments
 from wsm_data.files.typed_toml import build_config
 from wsm_data.loaders.config import LoaderConfig, OrderConfig, ReadConfig, SourceConfig
-from wsm_data.loaders.diagnosis import LoaderRun, cautions, diagnose, readers
-from wsm_data.loaders.doctor import examine
+from wsm_data.loaders.doctor.diagnosis import LoaderRun, cautions, diagnose, readers
+from wsm_data.loaders.doctor.examine import examine
 from wsm_data.loaders.timing import Part
 from wsm_data.view.text_table import aligned
 

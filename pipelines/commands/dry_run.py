@@ -7,12 +7,12 @@ from typing import Any
 
 import typer
 
-from pipelines.config import config_json, input_fields
 from pipelines.registry import load_stage
-from pipelines.report import StageReport, summary_table
-from pipelines.runner import RunOptions, run_stage
-from pipelines.stage import Stage
-from pipelines.upstream import UpstreamMissing
+from pipelines.running.runner import RunOptions, run_stage
+from pipelines.running.settings import config_json, input_fields
+from pipelines.running.stage import Stage
+from pipelines.running.stage_report import StageReport, summary_table
+from pipelines.running.upstream import UpstreamMissing
 from wsm_data.shards.names import MANIFEST_NAME
 
 _SHOWN_UNITS = 20

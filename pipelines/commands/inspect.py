@@ -4,10 +4,10 @@ from pathlib import Path
 
 import typer
 
-from pipelines.release_codec import codec_of
+from wsm_data.access.release import Release, open_release
 from wsm_data.errors import ConfigError
 from wsm_data.schema.identity import EpisodeId
-from wsm_data.shards.release import Release, open_release
+from wsm_data.shards.release_codec import codec_of
 from wsm_data.view.clip_text import describe_clip
 from wsm_data.view.contact_sheet import draw_contact_sheet
 from wsm_data.view.release_text import describe_release

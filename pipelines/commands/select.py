@@ -6,12 +6,12 @@ from typing import Any
 
 import typer
 
+from pipelines.artifacts.layout import release_folder
 from pipelines.commands.stages import run_built, stage_settings
-from pipelines.layout import release_folder
-from pipelines.release_codec import codec_of
 from pipelines.stages import materialise as copying
 from pipelines.stages import select, verify
-from wsm_data.shards.release import open_release
+from wsm_data.access.release import open_release
+from wsm_data.shards.release_codec import codec_of
 from wsm_data.view.selection_report import write_selection_report
 
 

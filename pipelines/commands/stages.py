@@ -10,14 +10,14 @@ from typing import Any
 import typer
 
 from pipelines.commands.dry_run import show_run, show_stage
-from pipelines.config import input_fields, merge, parse_assignments
-from pipelines.engines.choice import EngineName, engine
-from pipelines.folder import read_stage_record
 from pipelines.recipe import Recipe, load_recipe, stage_config, stage_sections
 from pipelines.registry import load_stage, load_stage_module
-from pipelines.report import summary_table
-from pipelines.runner import RunOptions, fingerprint, run_stage
-from pipelines.stage import Stage
+from pipelines.running.engines.choice import EngineName, engine
+from pipelines.running.folder import read_stage_record
+from pipelines.running.runner import RunOptions, fingerprint, run_stage
+from pipelines.running.settings import input_fields, merge, parse_assignments
+from pipelines.running.stage import Stage
+from pipelines.running.stage_report import summary_table
 from wsm_data.codecs.registry import CodecConfig, describe_codec
 from wsm_data.errors import ConfigError
 from wsm_data.files.digest import digest_json

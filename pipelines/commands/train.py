@@ -8,10 +8,10 @@ from pathlib import Path
 
 import typer
 
-from pipelines.config import config_json, merge, parse_assignments
-from pipelines.train_config import TrainRunConfig
-from pipelines.train_data import model_config
-from pipelines.train_run import run_training
+from pipelines.running.settings import config_json, merge, parse_assignments
+from pipelines.training.config import TrainRunConfig
+from pipelines.training.data import model_config
+from pipelines.training.pretrain import run_training
 from wsm_data.errors import ConfigError
 from wsm_data.files.typed_toml import build_config, load_toml
 from wsm_data.loaders.config import LoaderConfig

@@ -7,15 +7,15 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from pipelines.clip_builder import ClipVideos, Provenance, build_clip, measure_quality, read_videos
-from pipelines.clip_config import ClipConfig
-from pipelines.depth_gate import require_depth_agreement
-from pipelines.episode_table import read_episodes
-from pipelines.layout import clips_folder, codec_path, map_path, records_path
-from pipelines.scene_view import SceneView, view_scene
-from pipelines.source import IndexedSource, container_from_json, conventions_digest, indexed_source
-from pipelines.stage import Finished, Outcome, Settled, Stage, StageContext, Unit, refused
-from pipelines.upstream import done_outcomes, quarantine_of, require_stage
+from pipelines.artifacts.episode_table import read_episodes
+from pipelines.artifacts.layout import clips_folder, codec_path, map_path, records_path
+from pipelines.artifacts.source import IndexedSource, container_from_json, conventions_digest, indexed_source
+from pipelines.running.stage import Finished, Outcome, Settled, Stage, StageContext, Unit, refused
+from pipelines.running.upstream import done_outcomes, quarantine_of, require_stage
+from wsm_data.clips.build import ClipVideos, Provenance, build_clip, measure_quality, read_videos
+from wsm_data.clips.config import ClipConfig
+from wsm_data.clips.depth_gate import require_depth_agreement
+from wsm_data.clips.scene_view import SceneView, view_scene
 from wsm_data.codecs.base import VideoCodec
 from wsm_data.codecs.clip_video import VideoMemory
 from wsm_data.codecs.registry import CodecConfig, describe_codec, make_codec

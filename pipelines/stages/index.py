@@ -7,15 +7,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from pipelines.config import config_json
-from pipelines.depth_fusion import fused_points
-from pipelines.depth_gate import agreeing_records
-from pipelines.episode_table import EPISODES_FILE, record_digest, row_from_json, write_episodes
-from pipelines.folder import refusal_json
-from pipelines.layout import conventions_path, records_path, surface_path
-from pipelines.source import container_json, conventions_digest, write_conventions
-from pipelines.stage import DONE, Finished, Outcome, Settled, Stage, StageContext, Unit, refused
+from pipelines.artifacts.episode_table import EPISODES_FILE, record_digest, row_from_json, write_episodes
+from pipelines.artifacts.layout import conventions_path, records_path, surface_path
+from pipelines.artifacts.source import container_json, conventions_digest, write_conventions
+from pipelines.running.folder import refusal_json
+from pipelines.running.settings import config_json
+from pipelines.running.stage import DONE, Finished, Outcome, Settled, Stage, StageContext, Unit, refused
 from wsm_data.checks.record import check_record
+from wsm_data.clips.depth_fusion import fused_points
+from wsm_data.clips.depth_gate import agreeing_records
 from wsm_data.errors import DataError, Reason
 from wsm_data.files.digest import digest_json, sha256_file
 from wsm_data.files.typed_toml import INPUT

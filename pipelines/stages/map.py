@@ -6,11 +6,11 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
-from pipelines.folder import refusal_from_json
-from pipelines.layout import map_path, surface_path
-from pipelines.source import conventions_digest, indexed_source
-from pipelines.stage import Outcome, Stage, StageContext, Unit, refused
-from pipelines.upstream import done_outcomes
+from pipelines.artifacts.layout import map_path, surface_path
+from pipelines.artifacts.source import conventions_digest, indexed_source
+from pipelines.running.folder import refusal_from_json
+from pipelines.running.stage import Outcome, Stage, StageContext, Unit, refused
+from pipelines.running.upstream import done_outcomes
 from wsm_data.errors import DataError, Reason
 from wsm_data.files.digest import digest_json
 from wsm_data.files.typed_toml import INPUT

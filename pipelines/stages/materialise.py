@@ -3,15 +3,15 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, field
 
-from pipelines.layout import release_folder
-from pipelines.stage import Finished, Outcome, Settled, Stage, StageContext, Unit
+from pipelines.artifacts.layout import release_folder
+from pipelines.running.stage import Finished, Outcome, Settled, Stage, StageContext, Unit
+from wsm_data.access.materialise import copy_shard, finish_selection, plan_selection
+from wsm_data.access.release import Release, open_release
 from wsm_data.files.digest import digest_json, sha256_bytes
 from wsm_data.files.stores import open_store
 from wsm_data.files.typed_toml import INPUT
 from wsm_data.shards.manifest import ShardInfo
-from wsm_data.shards.materialise import copy_shard, finish_selection, plan_selection
 from wsm_data.shards.names import INDEX_NAME, INVENTORY_NAME, MANIFEST_NAME, QUARANTINE_NAME
-from wsm_data.shards.release import Release, open_release
 from wsm_data.shards.selection import Selection, read_selection, selection_file
 
 

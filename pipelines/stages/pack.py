@@ -7,12 +7,12 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from pipelines.inventory import account_of
-from pipelines.layout import clips_folder, codec_path, release_folder
-from pipelines.source import indexed_source
-from pipelines.split_table import read_split
-from pipelines.stage import Finished, Outcome, Settled, Stage, StageContext, Unit
-from pipelines.upstream import UpstreamMissing, done_outcomes, pending_units, quarantine_of, require_stage
+from pipelines.artifacts.inventory import account_of
+from pipelines.artifacts.layout import clips_folder, codec_path, release_folder
+from pipelines.artifacts.source import indexed_source
+from pipelines.artifacts.split_table import read_split
+from pipelines.running.stage import Finished, Outcome, Settled, Stage, StageContext, Unit
+from pipelines.running.upstream import UpstreamMissing, done_outcomes, pending_units, quarantine_of, require_stage
 from wsm_data.codecs.quality import CodecQuality
 from wsm_data.files.digest import digest_json
 from wsm_data.files.typed_toml import INPUT, SELECTION

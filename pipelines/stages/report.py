@@ -4,16 +4,16 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from pipelines.folder import read_ledger, read_stage_record
 from pipelines.registry import STAGES
-from pipelines.release_codec import codec_of
-from pipelines.stage import DONE, REFUSED, Outcome, Stage, StageContext, Unit
-from pipelines.upstream import pending_units
+from pipelines.running.folder import read_ledger, read_stage_record
+from pipelines.running.stage import DONE, REFUSED, Outcome, Stage, StageContext, Unit
+from pipelines.running.upstream import pending_units
+from wsm_data.access.release import open_release, read_manifest
 from wsm_data.files.digest import digest_json, sha256_file
 from wsm_data.files.stores import open_store
 from wsm_data.files.typed_toml import INPUT
 from wsm_data.shards.manifest import release_digest
-from wsm_data.shards.release import open_release, read_manifest
+from wsm_data.shards.release_codec import codec_of
 from wsm_data.view.clip_survey import SurveyConfig, survey_clips
 from wsm_data.view.report import write_report
 from wsm_data.view.report_data import ReportData, StageSummary

@@ -12,7 +12,8 @@ import fsspec
 import numpy as np
 import pyarrow as pa
 
-from pipelines.stage import Finished, Outcome, Settled, Stage, StageContext, Unit
+from pipelines.running.stage import Finished, Outcome, Settled, Stage, StageContext, Unit
+from wsm_data.access.release import Release, open_release, read_manifest
 from wsm_data.codecs.base import VideoCodec
 from wsm_data.codecs.dct import DctCodec
 from wsm_data.curation.path_outline import Outlines
@@ -26,7 +27,6 @@ from wsm_data.files.stores import open_store
 from wsm_data.files.typed_toml import INPUT, SELECTION
 from wsm_data.shards.manifest import release_digest
 from wsm_data.shards.names import SCORES_NAME
-from wsm_data.shards.release import Release, open_release, read_manifest
 
 _LOG = logging.getLogger(__name__)
 _PARTS = "parts"

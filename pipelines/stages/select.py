@@ -11,9 +11,10 @@ import fsspec
 import pyarrow as pa
 import xxhash
 
-from pipelines.command_text import command_text
-from pipelines.config import differences, settings_of
-from pipelines.stage import Outcome, Stage, StageContext, Unit
+from pipelines.running.command_text import command_text
+from pipelines.running.settings import differences, settings_of
+from pipelines.running.stage import Outcome, Stage, StageContext, Unit
+from wsm_data.access.release import Release, open_release, read_manifest
 from wsm_data.curation.scores_table import ScoreTable, read_paths, read_scorers, read_scores
 from wsm_data.curation.select import INDEX_COLUMNS, ChosenClips, SelectionConfig, select_clips
 from wsm_data.errors import ConfigError, IntegrityError
@@ -23,7 +24,6 @@ from wsm_data.files.stores import open_store
 from wsm_data.files.typed_toml import INPUT
 from wsm_data.shards.manifest import release_digest
 from wsm_data.shards.names import SCORES_NAME
-from wsm_data.shards.release import Release, open_release, read_manifest
 from wsm_data.shards.selection import (
     SELECTION_SUFFIX,
     Selection,

@@ -4,10 +4,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from pipelines.episode_table import EpisodeRow, read_episodes
-from pipelines.split_table import SPLIT_FILE, write_split
-from pipelines.stage import Outcome, Stage, StageContext, Unit
-from pipelines.upstream import require_stage
+from pipelines.artifacts.episode_table import EpisodeRow, read_episodes
+from pipelines.artifacts.split_table import SPLIT_FILE, write_split
+from pipelines.running.stage import Outcome, Stage, StageContext, Unit
+from pipelines.running.upstream import require_stage
 from wsm_data.curation.split import SplitBy, leaking_scenes, split_of
 from wsm_data.files.digest import digest_json, sha256_file
 from wsm_data.files.typed_toml import INPUT

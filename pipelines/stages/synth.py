@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator, Sequence
 
-from pipelines.config import settings_of
-from pipelines.stage import Outcome, Stage, StageContext, Unit
+from pipelines.running.settings import settings_of
+from pipelines.running.stage import Outcome, Stage, StageContext, Unit
 from wsm_data.files.digest import digest_json
 from wsm_data.synth.config import SynthConfig
 from wsm_data.synth.recording import plan_recording

@@ -6,15 +6,15 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from pipelines.stage import Outcome, Stage, StageContext, Unit
+from pipelines.running.stage import Outcome, Stage, StageContext, Unit
+from wsm_data.access.release import read_manifest
+from wsm_data.access.verify import verify_release
 from wsm_data.errors import IntegrityError
 from wsm_data.files.digest import digest_json, sha256_bytes
 from wsm_data.files.stores import open_store
 from wsm_data.files.typed_toml import INPUT
 from wsm_data.shards.findings import Finding
 from wsm_data.shards.names import INDEX_NAME, INVENTORY_NAME, MANIFEST_NAME, QUARANTINE_NAME
-from wsm_data.shards.release import read_manifest
-from wsm_data.shards.verify import verify_release
 
 _SHOWN_FINDINGS = 20
 

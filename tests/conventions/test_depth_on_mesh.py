@@ -11,7 +11,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipelines.layout import records_path
+from pipelines.artifacts.layout import records_path
+from wsm_data.access.release import open_release
 from wsm_data.codecs.clip_video import depth_video
 from wsm_data.codecs.depth import depth_m_from_latent_video
 from wsm_data.codecs.images import decode_depth
@@ -22,7 +23,6 @@ from wsm_data.readers.frames import iter_episode_frames
 from wsm_data.readers.manifest import MANIFEST_FOLDER, load_dataset
 from wsm_data.readers.record_table import read_records
 from wsm_data.schema.depth import DepthRange
-from wsm_data.shards.release import open_release
 from wsm_data.synth.home import make_home
 
 FRAMES = (0, 7)

@@ -14,8 +14,8 @@ from itertools import count
 import pytest
 from fake_stages import COPY, CopyConfig
 
-from pipelines.runner import RunOptions, run_stage
-from pipelines.upstream import require_stage
+from pipelines.running.runner import RunOptions, run_stage
+from pipelines.running.upstream import require_stage
 from wsm_data.errors import ConfigError
 
 OPTIONS = RunOptions(quiet=True, max_refused=100)
@@ -136,7 +136,7 @@ PROGRAM = """
 import sys
 from pathlib import Path
 from fake_stages import COPY, CopyConfig
-from pipelines.runner import RunOptions, run_stage
+from pipelines.running.runner import RunOptions, run_stage
 if __name__ == "__main__":
     source, out, workers = Path(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3])
     run_stage(COPY, CopyConfig(source=source, pause_s=0.03), out, RunOptions(quiet=True, workers=workers))

@@ -11,9 +11,9 @@ import pytest
 
 from pipelines.commands.audit_run import audit_run
 from wsm_data.errors import IntegrityError
-from wsm_data.loaders.audit_run import audit_epochs
-from wsm_data.loaders.ledger_sources import open_recorded_sources
-from wsm_data.loaders.ledger_timeline import read_timeline
+from wsm_data.loaders.ledger.audit import audit_epochs
+from wsm_data.loaders.ledger.sources import open_recorded_sources
+from wsm_data.loaders.ledger.timeline import read_timeline
 
 PROGRAM = Path(__file__).parent / "fakes" / "train_rank.py"
 WAIT_S = 120  # far beyond any start on a busy machine: what takes longer hangs

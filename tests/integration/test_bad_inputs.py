@@ -14,12 +14,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from pipelines.folder import read_ledger
+from pipelines.running.folder import read_ledger
+from wsm_data.access.release import open_release
+from wsm_data.access.verify import verify_release
 from wsm_data.errors import BudgetExceeded, ConfigError
 from wsm_data.files.jsonlines import read_lines
 from wsm_data.shards.inventory import UnitState
-from wsm_data.shards.release import open_release
-from wsm_data.shards.verify import verify_release
 
 GROUP = "synth_d435i"
 POINT = np.dtype([("xyz", "<f4", 3), ("rgb", "u1", 3)])

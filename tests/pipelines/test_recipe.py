@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from pipelines.config import parse_assignments
 from pipelines.recipe import Recipe, load_recipe, recipe_names, recipe_summaries, stage_config, stage_sections
 from pipelines.registry import STAGES
+from pipelines.running.settings import parse_assignments
 from wsm_data.errors import ConfigError
 
 

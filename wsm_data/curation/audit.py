@@ -4,13 +4,13 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
+from wsm_data.access.release import Release
 from wsm_data.curation.audit_content import CONTENT_COLUMNS, repeated_content, scenes_in_several_splits
 from wsm_data.curation.audit_finding import AuditFinding, Check, worst_first
 from wsm_data.curation.audit_labels import distance_conflicts, map_conflicts, near_duplicates_across_splits
 from wsm_data.curation.clip_labels import read_labels
 from wsm_data.curation.diversity import DiversityConfig
 from wsm_data.curation.split import SplitBy
-from wsm_data.shards.release import Release
 
 
 @dataclass(frozen=True, kw_only=True)

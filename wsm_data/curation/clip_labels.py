@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wsm_data.access.release import Release
 from wsm_data.curation.path_outline import PATH_POINTS, path_outline
 from wsm_data.errors import IntegrityError
 from wsm_data.files.digest import xxh3_64
@@ -13,7 +14,6 @@ from wsm_data.schema.arrays import Float64Array
 from wsm_data.schema.clip_meta import ClipMeta
 from wsm_data.shards.index_row import IndexRow
 from wsm_data.shards.members import META, STORED_DTYPES, Member
-from wsm_data.shards.release import Release
 
 _LABELS = ("poses", "expert_distance", META)
 

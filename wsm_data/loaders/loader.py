@@ -9,19 +9,19 @@ from typing import Any
 
 import torch.utils.data
 
+from wsm_data.access.shard_reader import ShardReader
 from wsm_data.errors import ConfigError
-from wsm_data.loaders.batch import Batch, PackedBatch
+from wsm_data.loaders.batches.batch import Batch, PackedBatch
+from wsm_data.loaders.batches.transfer import hand_over, open_transfer
 from wsm_data.loaders.config import LoaderConfig
-from wsm_data.loaders.ledger import LedgerWriter
-from wsm_data.loaders.plan import EpochPlan, PlanReport, rows_per_rank
+from wsm_data.loaders.ledger.writer import LedgerWriter
+from wsm_data.loaders.order.epoch_plan import EpochPlan, PlanReport, rows_per_rank
 from wsm_data.loaders.ranks import place_among_ranks
-from wsm_data.loaders.shard_reader import ShardReader
-from wsm_data.loaders.source_table import Sources, open_sources
-from wsm_data.loaders.state import loader_state, restore, state_to_json
-from wsm_data.loaders.step_reader import StepReader
-from wsm_data.loaders.stream import BatchStream, Delivered, open_stream
+from wsm_data.loaders.reading.step_reader import StepReader
+from wsm_data.loaders.reading.stream import BatchStream, Delivered, open_stream
+from wsm_data.loaders.sources.clips import Sources, open_sources
+from wsm_data.loaders.sources.state import loader_state, restore, state_to_json
 from wsm_data.loaders.timing import Part, Timing
-from wsm_data.loaders.transfer import hand_over, open_transfer
 
 _CLOSED = -1
 """In place of the number of the process that a reader belongs to."""

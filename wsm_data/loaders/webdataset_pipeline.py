@@ -14,17 +14,17 @@ import numpy as np
 import torch.utils.data
 import webdataset
 
+from wsm_data.access.open_shards import open_shards
+from wsm_data.access.shard_reader import ShardReader, Span
 from wsm_data.errors import ConfigError
 from wsm_data.files.stores import LocalStore
 from wsm_data.loaders.config import Arrangement, OrderConfig, ReadConfig, SourceConfig
-from wsm_data.loaders.member_reads import read_members
-from wsm_data.loaders.open_shards import open_shards
-from wsm_data.loaders.plan import EpochPlan, plan_epoch, rows_per_rank
+from wsm_data.loaders.order.epoch_plan import EpochPlan, plan_epoch, rows_per_rank
+from wsm_data.loaders.order.stable_hash import Int64Array
 from wsm_data.loaders.ranks import place_among_ranks
-from wsm_data.loaders.shard_reader import ShardReader, Span
-from wsm_data.loaders.source_table import SourceTable, open_sources
-from wsm_data.loaders.stable_hash import Int64Array
-from wsm_data.loaders.verification import Verification, verification_of
+from wsm_data.loaders.reading.member_reads import read_members
+from wsm_data.loaders.reading.verification import Verification, verification_of
+from wsm_data.loaders.sources.clips import SourceTable, open_sources
 from wsm_data.shards.members import MEMBER_NAMES
 
 

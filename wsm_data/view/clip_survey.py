@@ -4,9 +4,9 @@ import hashlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from wsm_data.access.release import Release
 from wsm_data.codecs.base import VideoCodec
 from wsm_data.schema.clip import Clip
-from wsm_data.shards.release import Release
 from wsm_data.view.clip_facts import ClipFacts, clip_facts, moving_frames
 from wsm_data.view.clip_pictures import ClipPictures, decode_pictures, spread_frames
 from wsm_data.view.scene_overview import SceneOverview, ScenePath, scene_overview, scene_path

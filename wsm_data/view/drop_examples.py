@@ -3,7 +3,7 @@
 from collections import Counter
 from dataclasses import dataclass
 
-from wsm_data.shards.release import Release
+from wsm_data.access.release import Release
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import pyarrow as pa
 
+from wsm_data.access.release import Release
 from wsm_data.shards.index import IndexTable
 from wsm_data.shards.names import TRAIN_SPLIT
-from wsm_data.shards.release import Release
 
 _TEXT_COLUMNS = ("split", "group", "camera", "scene", "physical_scene")
 

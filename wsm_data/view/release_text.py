@@ -1,7 +1,7 @@
 """A release in words and numbers, for a terminal."""
 
+from wsm_data.access.release import Release
 from wsm_data.shards.manifest import release_digest
-from wsm_data.shards.release import Release
 from wsm_data.view.drop_examples import drop_examples
 from wsm_data.view.release_counts import ReleaseCounts, count_release
 from wsm_data.view.text_table import aligned, bytes_text, printable

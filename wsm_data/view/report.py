@@ -9,11 +9,11 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
+from wsm_data.access.release import Release
 from wsm_data.codecs.quality import CodecQuality
 from wsm_data.files.atomic import write_bytes
 from wsm_data.schema.arrays import Uint8Array
 from wsm_data.shards.manifest import release_digest
-from wsm_data.shards.release import Release
 from wsm_data.view.charts import depth_error_chart, histogram, stage_chart
 from wsm_data.view.clip_facts import ClipFacts
 from wsm_data.view.clip_survey import ClipSurvey, ClipThumbnail

@@ -9,11 +9,11 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
+from wsm_data.access.release import Release
 from wsm_data.codecs.base import VideoCodec
 from wsm_data.curation.explain import score_label, value_text
 from wsm_data.files.atomic import write_bytes
 from wsm_data.schema.arrays import Float64Array, Uint8Array
-from wsm_data.shards.release import Release
 from wsm_data.view.depth_colours import depth_gradient
 from wsm_data.view.map_figures import clip_map_figure
 from wsm_data.view.map_plot import MAP_SWATCHES

@@ -9,6 +9,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from wsm_data.access.release import Release
 from wsm_data.codecs.base import VideoCodec
 from wsm_data.curation.exclusion import excluded_clips
 from wsm_data.curation.explain import ExplainedScore, deciding_scores, explain_clips, leading_scores
@@ -22,7 +23,6 @@ from wsm_data.errors import ConfigError
 from wsm_data.files.typed_toml import build_config
 from wsm_data.schema.arrays import Float64Array
 from wsm_data.schema.clip import Clip
-from wsm_data.shards.release import Release
 from wsm_data.shards.selection import Selection, read_selection, selection_names
 from wsm_data.view.clip_facts import moving_frames
 from wsm_data.view.clip_pictures import ClipPictures, decode_pictures, spread_frames

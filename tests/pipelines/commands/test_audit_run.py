@@ -10,8 +10,8 @@ from pipelines.cli import app
 from pipelines.commands.audit_run import audit_run
 from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.loaders.config import OrderConfig, Remainder, SourceConfig
-from wsm_data.loaders.ledger import LedgerWriter
-from wsm_data.loaders.source_table import open_sources
+from wsm_data.loaders.ledger.writer import LedgerWriter
+from wsm_data.loaders.sources.clips import open_sources
 
 ORDER = OrderConfig(seed=2, global_batch=2, remainder=Remainder.DROP)
 

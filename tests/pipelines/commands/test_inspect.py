@@ -8,7 +8,7 @@ from pipelines.cli import app
 from pipelines.commands.inspect import inspect_release
 from pipelines.recipe import Recipe, stage_config
 from pipelines.registry import load_stage
-from pipelines.runner import RunOptions, run_stage
+from pipelines.running.runner import RunOptions, run_stage
 from wsm_data.errors import ConfigError, IntegrityError
 
 SCENE = "box_zed/Acker.ville"

@@ -8,8 +8,8 @@ from fake_wsm import use_fake_stages
 from pipelines import recipe, registry
 from pipelines.cli import _OPTIONS
 from pipelines.commands.stages import run_one, run_recipe
-from pipelines.folder import read_stage_record, write_stage_record
-from pipelines.runner import RunOptions
+from pipelines.running.folder import read_stage_record, write_stage_record
+from pipelines.running.runner import RunOptions
 from wsm_data.errors import ConfigError
 
 OPTIONS = {

@@ -12,8 +12,8 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from pathlib import Path
 
-from pipelines.stage import Finished, Outcome, Settled, Stage, StageContext, Unit
-from pipelines.upstream import done_outcomes, require_stage
+from pipelines.running.stage import Finished, Outcome, Settled, Stage, StageContext, Unit
+from pipelines.running.upstream import done_outcomes, require_stage
 from wsm_data.errors import DataError, Reason
 from wsm_data.files.atomic import write_bytes, write_text
 from wsm_data.files.digest import sha256_bytes

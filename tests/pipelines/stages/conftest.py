@@ -9,12 +9,11 @@ from typing import Any
 import pytest
 from box_room import MANIFEST_TOML, UPSTAIRS, Drive, Room, along_x, scene_files, write_archive, write_folder
 
-from pipelines.clip_config import ClipConfig
-from pipelines.folder import read_ledger
 from pipelines.registry import load_stage
-from pipelines.report import StageReport
-from pipelines.runner import RunOptions, run_stage
-from pipelines.stage import Outcome, Stage, Unit
+from pipelines.running.folder import read_ledger
+from pipelines.running.runner import RunOptions, run_stage
+from pipelines.running.stage import Outcome, Stage, Unit
+from pipelines.running.stage_report import StageReport
 from pipelines.stages.encode import EncodeConfig
 from pipelines.stages.index import IndexConfig
 from pipelines.stages.map import MapConfig
@@ -23,6 +22,7 @@ from pipelines.stages.report import ReportConfig
 from pipelines.stages.score import ScoreConfig
 from pipelines.stages.split import SplitConfig
 from pipelines.stages.verify import VerifyConfig
+from wsm_data.clips.config import ClipConfig
 from wsm_data.files.jsonlines import read_lines
 from wsm_data.view.clip_survey import SurveyConfig
 

@@ -12,10 +12,10 @@ from box_room import (
 )
 from encode_scenes import DEN, HALL, UNITS, ZED, again, frame
 
-from pipelines.clip_config import ClipConfig
-from pipelines.episode_table import read_episodes
-from pipelines.layout import clips_folder, codec_path
+from pipelines.artifacts.episode_table import read_episodes
+from pipelines.artifacts.layout import clips_folder, codec_path
 from pipelines.stages import encode, index
+from wsm_data.clips.config import ClipConfig
 from wsm_data.codecs.dct import DctCodec
 from wsm_data.codecs.quality import CodecQuality
 from wsm_data.codecs.registry import CodecConfig

@@ -10,8 +10,8 @@ from box_room import (
 )
 from encode_scenes import HALL, ZED, again, frame
 
-from pipelines.folder import read_stage_record
-from pipelines.layout import clips_folder
+from pipelines.artifacts.layout import clips_folder
+from pipelines.running.folder import read_stage_record
 from wsm_data.errors import IntegrityError
 from wsm_data.files.jsonlines import read_lines
 from wsm_data.shards.fragment import read_fragment_info

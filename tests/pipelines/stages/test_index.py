@@ -17,11 +17,11 @@ from box_room import (
     table_bytes,
 )
 
-from pipelines.config import settings_of
-from pipelines.episode_table import read_episodes
-from pipelines.folder import read_stage_record
-from pipelines.layout import records_path, surface_path
-from pipelines.source import container_from_json
+from pipelines.artifacts.episode_table import read_episodes
+from pipelines.artifacts.layout import records_path, surface_path
+from pipelines.artifacts.source import container_from_json
+from pipelines.running.folder import read_stage_record
+from pipelines.running.settings import settings_of
 from pipelines.stages.index import IndexConfig, count_differences
 from wsm_data.errors import ConfigError
 from wsm_data.files.jsonlines import read_lines

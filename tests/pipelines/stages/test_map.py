@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from box_room import DATASET, MANIFEST_TOML, UPSTAIRS, along_x
 
-from pipelines.layout import map_path
+from pipelines.artifacts.layout import map_path
 from pipelines.stages.map import WithoutCloud
 from wsm_data.errors import ConfigError
 from wsm_data.files.jsonlines import read_lines

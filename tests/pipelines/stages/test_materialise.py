@@ -6,12 +6,12 @@ import pytest
 from typer.testing import CliRunner
 
 from pipelines.cli import app
-from pipelines.runner import RunOptions, run_stage
+from pipelines.running.runner import RunOptions, run_stage
 from pipelines.stages.materialise import STAGE, MaterialiseConfig
 from pipelines.stages.verify import require_sound
+from wsm_data.access.release import open_release
 from wsm_data.errors import ConfigError
 from wsm_data.shards.manifest import release_digest
-from wsm_data.shards.release import open_release
 from wsm_data.shards.selection import read_selection
 
 QUIET = RunOptions(quiet=True)

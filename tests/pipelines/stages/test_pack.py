@@ -4,16 +4,16 @@ import shutil
 import pytest
 from box_room import MANIFEST_TOML, RGB, along_x
 
-from pipelines.clip_config import ClipConfig
-from pipelines.folder import read_stage_record
+from pipelines.running.folder import read_stage_record
 from pipelines.stages.pack import PackConfig
+from wsm_data.access.release import open_release
+from wsm_data.access.verify import verify_release
+from wsm_data.clips.config import ClipConfig
 from wsm_data.codecs.quality import CodecQuality
 from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.files.digest import sha256_file
 from wsm_data.files.typed_toml import build_config
 from wsm_data.shards.inventory import UnitState
-from wsm_data.shards.release import open_release
-from wsm_data.shards.verify import verify_release
 
 DEN, HALL, ZED = "box_d435i/den", "box_d435i/hall", "box_zed/hall"
 MANIFEST = "dataset.json"

@@ -9,18 +9,18 @@ import pyarrow.parquet as pq
 import pytest
 
 from pipelines.registry import load_stage
-from pipelines.runner import RunOptions, run_stage
+from pipelines.running.runner import RunOptions, run_stage
 from pipelines.stages import score as stage_module
 from pipelines.stages.score import ScoreConfig
 from pipelines.stages.verify import VerifyConfig
+from wsm_data.access.release import open_release
+from wsm_data.access.verify import verify_release
 from wsm_data.codecs.dct import DctCodec
 from wsm_data.curation.rollouts import ROLLOUT_SCORES, rollout_schema
 from wsm_data.curation.score_clip import CLIP_SCORES, score_clip
 from wsm_data.curation.scores_table import read_paths, read_scores
 from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.shards.manifest import release_digest
-from wsm_data.shards.release import open_release
-from wsm_data.shards.verify import verify_release
 
 NAMES = [one.name for one in CLIP_SCORES]
 

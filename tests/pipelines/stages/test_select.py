@@ -7,18 +7,18 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 import pytest
 
-from pipelines.config import parse_assignments
 from pipelines.registry import load_stage
-from pipelines.runner import RunOptions, run_stage
+from pipelines.running.runner import RunOptions, run_stage
+from pipelines.running.settings import parse_assignments
 from pipelines.stages.score import ScoreConfig
 from pipelines.stages.select import SelectConfig, install_selection
+from wsm_data.access.release import open_release
 from wsm_data.curation.exclusion import ExclusionConfig
 from wsm_data.curation.rollouts import rollout_schema
 from wsm_data.curation.rule import RuleConfig, RuleKind
 from wsm_data.errors import ConfigError
 from wsm_data.files.typed_toml import build_config
 from wsm_data.shards.manifest import release_digest
-from wsm_data.shards.release import open_release
 from wsm_data.shards.selection import parse_selection, read_selection
 
 QUIET = RunOptions(quiet=True)

@@ -1,7 +1,7 @@
 import pytest
 from box_room import along_x
 
-from pipelines.split_table import read_split
+from pipelines.artifacts.split_table import read_split
 from pipelines.stages.split import SplitConfig
 from wsm_data.curation.split import SplitBy, leaking_scenes, split_of
 from wsm_data.errors import ConfigError

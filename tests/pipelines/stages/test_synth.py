@@ -3,9 +3,9 @@
 import pytest
 import trimesh
 
-from pipelines.folder import read_ledger
 from pipelines.registry import load_stage
-from pipelines.runner import RunOptions, run_stage
+from pipelines.running.folder import read_ledger
+from pipelines.running.runner import RunOptions, run_stage
 from wsm_data.readers.containers import find_containers
 from wsm_data.readers.manifest import load_dataset
 from wsm_data.synth.config import SynthConfig

@@ -5,12 +5,12 @@ import fsspec
 import pytest
 from box_room import along_x
 
-from pipelines.folder import read_ledger, read_stage_record
+from pipelines.running.folder import read_ledger, read_stage_record
 from pipelines.stages.verify import require_sound
+from wsm_data.access.release import open_release
 from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.files.digest import sha256_file
 from wsm_data.files.jsonlines import read_lines
-from wsm_data.shards.release import open_release
 
 ZED = "box_zed/hall"
 

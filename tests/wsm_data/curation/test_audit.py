@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
+from wsm_data.access.release import open_release
 from wsm_data.curation.audit import AuditConfig, audit_release, count_findings
 from wsm_data.curation.audit_finding import Check, Severity
 from wsm_data.curation.split import SplitBy
-from wsm_data.shards.release import open_release
 
 
 @pytest.fixture

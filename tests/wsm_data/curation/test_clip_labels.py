@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
+from wsm_data.access.release import open_release
 from wsm_data.curation.clip_labels import read_labels
 from wsm_data.errors import IntegrityError
 from wsm_data.geometry.transform import transforms_from_vectors
-from wsm_data.shards.release import open_release
 
 
 @pytest.fixture

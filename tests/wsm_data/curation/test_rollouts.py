@@ -5,10 +5,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from wsm_data.access.release import open_release
 from wsm_data.curation.rollouts import ROLLOUT_SCORES, read_rollouts, rollout_schema, rollout_scores
 from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.shards.manifest import release_digest
-from wsm_data.shards.release import open_release
 
 NAN = float("nan")
 

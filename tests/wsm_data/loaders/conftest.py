@@ -4,7 +4,6 @@ import sys
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "fakes"))
-sys.path.insert(0, str(Path(__file__).parent / "fakes"))
 
 from loader_release import expected_batch, make_loader, released  # noqa: F401
 from remote_release import address, published, remote, store_server  # noqa: F401

@@ -7,8 +7,8 @@ import pytest
 
 from wsm_data.files.retries import RequestConfig
 from wsm_data.loaders.config import Arrangement, LoaderConfig, OrderConfig, ReadConfig, SourceConfig
-from wsm_data.loaders.mixing import stretch_of_epoch
-from wsm_data.loaders.stable_hash import mix64
+from wsm_data.loaders.order.mixing import stretch_of_epoch
+from wsm_data.loaders.order.stable_hash import mix64
 
 
 @pytest.mark.parametrize("weight", [0.0, -1.0, math.nan, math.inf, np.float64(math.inf)])

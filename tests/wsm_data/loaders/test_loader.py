@@ -12,7 +12,7 @@ import torch
 
 from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.loaders.config import LoaderConfig, OrderConfig, SourceConfig
-from wsm_data.loaders.ledger_files import ledger_files
+from wsm_data.loaders.ledger.files import ledger_files
 from wsm_data.loaders.loader import ClipLoader
 from wsm_data.loaders.timing import Part
 

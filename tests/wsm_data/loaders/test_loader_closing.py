@@ -13,7 +13,7 @@ from wsm_data.errors import StoreError
 from wsm_data.loaders.config import LoaderConfig, OrderConfig, RemoteAccess, SourceConfig
 from wsm_data.loaders.loader import ClipLoader
 from wsm_data.loaders.queries import QueryLoader
-from wsm_data.loaders.query_table import QueryConfig
+from wsm_data.loaders.sources.queries import QueryConfig
 
 pytestmark = pytest.mark.timeout(60)  # far below the time that the store below is given to answer
 FOREVER = 10**9

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 import torch
 
-from wsm_data.loaders.batch import Batch, layout_of
+from wsm_data.loaders.batches.batch import Batch, layout_of
 from wsm_data.loaders.config import ReadConfig
 
 ROOT = Path(__file__).parents[3]

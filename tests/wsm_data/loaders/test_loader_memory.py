@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from wsm_data.loaders import buffers
+from wsm_data.loaders.batches import buffers
 from wsm_data.loaders.config import LoaderConfig, OrderConfig, ReadConfig, RemoteAccess, SourceConfig
 from wsm_data.loaders.loader import ClipLoader
 
@@ -51,7 +51,7 @@ def test_memory_files_and_threads_are_constant_over_20_epochs(make_loader, setti
 @pytest.fixture
 def url(released):
     """The release behind a server that runs in a process of its own, so that nothing of it is counted here."""
-    command = [sys.executable, str(Path(__file__).parent / "fakes" / "folder_server.py"), str(released.folder)]
+    command = [sys.executable, str(Path(__file__).parents[1] / "fakes" / "folder_server.py"), str(released.folder)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
         try:
             yield server.stdout.readline().strip()

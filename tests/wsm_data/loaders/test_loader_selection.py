@@ -4,6 +4,8 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
+from wsm_data.access.materialise import copy_shard, finish_selection, plan_selection
+from wsm_data.access.release import open_release
 from wsm_data.curation.diversity import DiversityConfig
 from wsm_data.curation.rule import RuleConfig
 from wsm_data.curation.scores_table import Direction, ScorerInfo, ScoreTable
@@ -12,8 +14,6 @@ from wsm_data.errors import ConfigError
 from wsm_data.loaders.config import LoaderConfig, OrderConfig, ReadConfig, SourceConfig
 from wsm_data.loaders.loader import ClipLoader
 from wsm_data.shards.manifest import release_digest
-from wsm_data.shards.materialise import copy_shard, finish_selection, plan_selection
-from wsm_data.shards.release import open_release
 from wsm_data.shards.selection import Selection, selection_path, write_selection
 
 

@@ -8,7 +8,6 @@ import torch.utils.data
 
 from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.geometry.transform import transforms_from_vectors
-from wsm_data.loaders.audit_run import audit_epochs
 from wsm_data.loaders.config import (
     Arrangement,
     LoaderConfig,
@@ -19,10 +18,11 @@ from wsm_data.loaders.config import (
     SourceConfig,
     Verify,
 )
-from wsm_data.loaders.ledger_sources import open_recorded_sources
-from wsm_data.loaders.ledger_timeline import read_timeline
+from wsm_data.loaders.ledger.audit import audit_epochs
+from wsm_data.loaders.ledger.sources import open_recorded_sources
+from wsm_data.loaders.ledger.timeline import read_timeline
 from wsm_data.loaders.queries import QueryLoader
-from wsm_data.loaders.query_table import QueryConfig
+from wsm_data.loaders.sources.queries import QueryConfig
 
 TWO = QueryConfig(queries_per_clip=2, future_latents=2)
 

@@ -11,8 +11,8 @@ from fault_proxy import Fault
 
 from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.loaders.config import Arrangement, OrderConfig, ReadConfig, Remainder, RemoteAccess, SourceConfig, Verify
-from wsm_data.loaders.plan import plan_epoch
-from wsm_data.loaders.source_table import open_sources
+from wsm_data.loaders.order.epoch_plan import plan_epoch
+from wsm_data.loaders.sources.clips import open_sources
 from wsm_data.loaders.webdataset_pipeline import as_webdataset
 
 PAIRS = OrderConfig(seed=3, global_batch=2, remainder=Remainder.PAD, block_clips=1)

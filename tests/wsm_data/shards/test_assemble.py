@@ -8,12 +8,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from wsm_data.access.verify import verify_release
 from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.schema.clip import Clip
 from wsm_data.schema.depth import DepthRange
 from wsm_data.shards.assemble import begin_release
 from wsm_data.shards.inventory import InventoryRow, UnitState
-from wsm_data.shards.verify import verify_release
 
 
 def test_a_release_holds_these_files(tiny: SimpleNamespace) -> None:

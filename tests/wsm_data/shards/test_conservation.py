@@ -4,10 +4,10 @@ from types import SimpleNamespace
 
 import pytest
 
+from wsm_data.access.release import open_release
 from wsm_data.shards.conservation import check_conservation, check_counts
 from wsm_data.shards.index import IndexTable, index_table
 from wsm_data.shards.inventory import InventoryRow, UnitState
-from wsm_data.shards.release import open_release
 
 FIRST = "synth_d435i/home_0001/000000"
 REFUSED = "synth_d435i/home_0002/000009"

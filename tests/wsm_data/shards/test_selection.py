@@ -3,10 +3,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from wsm_data.access.release import open_release
 from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.files.stores import open_store
 from wsm_data.shards.manifest import release_digest
-from wsm_data.shards.release import open_release
 from wsm_data.shards.selection import (
     Selection,
     parse_selection,

@@ -11,7 +11,8 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pipelines.config import settings_of
+from pipelines.running.settings import settings_of
+from wsm_data.access.release import Release, open_release
 from wsm_data.codecs.dct import DctCodec
 from wsm_data.codecs.depth import normalise_depth
 from wsm_data.codecs.quality import CodecQuality, DepthErrors
@@ -31,7 +32,6 @@ from wsm_data.shards.fragment import build_fragment, fragment_path, read_fragmen
 from wsm_data.shards.inventory import InventoryRow, UnitState
 from wsm_data.shards.manifest import release_digest
 from wsm_data.shards.plan import PlannedClip, plan_shards
-from wsm_data.shards.release import Release, open_release
 from wsm_data.shards.selection import Selection, selection_path, write_selection
 from wsm_data.shards.writer import write_shard
 from wsm_data.view.selection_survey import SelectionSurvey, SelectionSurveyConfig, survey_selection

@@ -1,0 +1,233 @@
+"""A stage's output folder: stage.json, ledger.jsonl, quarantine.jsonl and the outputs, for one writer at a time."""
+
+import errno
+import fcntl
+import json
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TextIO
+
+from pipelines.running.stage import Outcome
+from wsm_data.errors import ConfigError, IntegrityError, Reason
+from wsm_data.files.atomic import write_text
+from wsm_data.files.jsonlines import drop_torn_line, line_appender, read_lines, write_lines
+from wsm_data.schema.verdict import Refusal
+
+STAGE_FILE, LEDGER_FILE = "stage.json", "ledger.jsonl"
+QUARANTINE_FILE, PENDING_FILE = "quarantine.jsonl", "pending.jsonl"
+
+
+@dataclass(frozen=True, kw_only=True)
+class LedgerEntry:
+    """The last word on a unit.
+
+    Attributes:
+        key: key it was settled under.
+        outcome: what became of it.
+        sizes: bytes of its outputs when it was settled, in their order; None for what was no file.
+        stale: the unit is pending by now, or not listed for the time being; its outputs are kept for when it returns.
+    """
+
+    key: str
+    outcome: Outcome
+    sizes: tuple[int | None, ...] = ()
+    stale: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class StageRecord:
+    """What stage.json holds.
+
+    Attributes:
+        name: the stage.
+        version: version of the stage that wrote the folder.
+        settings: every setting that decides the bytes.
+        config: the whole resolved config, input paths included.
+        fingerprint: digest of name, version and settings.
+        inputs: fingerprint of each upstream stage, by the config field that names it.
+        seen: `finished` of each upstream stage when this one was last finished, by the same names.
+        units: number of units in the listing.
+        workers: worker processes of the last run.
+        finished: digest of the outcomes `finish` was last called with; empty before.
+        outputs: size in bytes of every file that `finish` wrote, by its name relative to the folder.
+    """
+
+    name: str
+    version: int
+    settings: Mapping[str, Any]
+    config: Mapping[str, Any]
+    fingerprint: str
+    inputs: Mapping[str, str]
+    seen: Mapping[str, str]
+    units: int = 0
+    workers: int = 1
+    finished: str = ""
+    outputs: Mapping[str, int | None] = field(default_factory=dict)
+
+
+def read_stage_record(folder: Path) -> StageRecord | None:
+    """The record of a stage folder, or None where no stage has written yet.
+
+    Raises:
+        IntegrityError: stage.json is there but unreadable.
+    """
+    path = folder / STAGE_FILE
+    if not path.exists():
+        return None
+    try:
+        return StageRecord(**json.loads(path.read_text()))
+    except (ValueError, TypeError) as error:
+        raise IntegrityError(
+            f"{path} is not a stage record ({error}); delete the folder and run the stage again"
+        ) from error
+
+
+def write_stage_record(folder: Path, record: StageRecord) -> None:
+    """Write stage.json atomically."""
+    write_text(folder / STAGE_FILE, json.dumps(vars(record), indent=2, sort_keys=True) + "\n")
+
+
+def read_ledger(folder: Path, *, with_stale: bool = False) -> dict[str, LedgerEntry]:
+    """The last entry of every unit; stale ones, which are no part of the stage's result, only if they are asked for."""
+    entries = {str(line["unit"]): _entry_from_line(line) for line in read_lines(folder / LEDGER_FILE)}
+    return {unit: entry for unit, entry in entries.items() if with_stale or not entry.stale}
+
+
+def size_on_disk(path: Path) -> int | None:
+    """Bytes of a file; None for a folder and for what is not there."""
+    return path.stat().st_size if path.is_file() else None
+
+
+def is_as_written(path: Path, size: int | None) -> bool:
+    """Whether an output is still there, with its size where that is known."""
+    return path.exists() if size is None else size_on_disk(path) == size
+
+
+@contextmanager
+def ledger_appender(folder: Path) -> Iterator[Callable[[LedgerEntry], LedgerEntry]]:
+    """Open the ledger for more outcomes; yields the function that adds one, which then survives a kill.
+
+    That function returns the entry as a later run reads it (a tuple among the facts is a list by then), so that what
+    follows cannot depend on whether the run was cut short.
+    """
+    with line_appender(folder / LEDGER_FILE) as append_line:
+
+        def append(entry: LedgerEntry) -> LedgerEntry:
+            sizes = [size_on_disk(folder / output) for output in entry.outcome.outputs]
+            line = {**_ledger_line(entry), "sizes": sizes, "time": round(time.time(), 3)}
+            return _entry_from_line(append_line(line))
+
+        yield append
+
+
+def compact_ledger(folder: Path, settled: Mapping[str, LedgerEntry], stale: Mapping[str, LedgerEntry]) -> None:
+    """Keep only the given entries, mark the stale ones, and delete the files that only others wrote.
+
+    Lines keep their text, times included; a ledger in which nothing changes is left alone.
+    """
+    lines = list(read_lines(folder / LEDGER_FILE))
+    kept = []
+    for unit, line in {str(line["unit"]): line for line in lines}.items():
+        plain = {name: value for name, value in line.items() if name != "stale"}
+        if unit in settled and settled[unit].key == line["key"]:
+            kept.append(plain)
+        elif unit in stale and stale[unit].key == line["key"]:
+            kept.append({**plain, "stale": True})
+    if kept == lines:
+        return
+    wanted = {output for line in kept for output in _outputs(line)}
+    for line in lines:
+        for output in _outputs(line):
+            if output not in wanted and (folder / output).is_file():
+                (folder / output).unlink()
+    write_lines(folder / LEDGER_FILE, kept)
+
+
+def _outputs(line: Mapping[str, Any]) -> Sequence[str]:
+    return tuple(line["outputs"])
+
+
+def _ledger_line(entry: LedgerEntry) -> dict[str, Any]:
+    outcome = entry.outcome
+    return {
+        "unit": outcome.unit,
+        "key": entry.key,
+        "state": outcome.state,
+        "digest": outcome.digest,
+        "outputs": list(outcome.outputs),
+        "facts": dict(outcome.facts),
+        "refusals": [refusal_json(refusal) for refusal in outcome.refusals],
+        "seconds": round(outcome.seconds, 4),
+    }
+
+
+def write_quarantine(folder: Path, record: StageRecord, refusals: Iterable[Refusal]) -> None:
+    """Write all refusals of the stage, sorted by unit, replacing what an earlier state of the inputs left.
+
+    A refusal that stood there before keeps its time.
+    """
+    path = folder / QUARANTINE_FILE
+    seen = {(line["unit"], line["reason"], line["message"]): line["time"] for line in read_lines(path)}
+    stage = {"stage": record.name, "stage_version": record.version, "fingerprint": record.fingerprint}
+    lines = []
+    for refusal in sorted(refusals, key=lambda one: (one.unit, one.source, one.reason)):
+        line = {**refusal_json(refusal), **stage}
+        identity = (line["unit"], line["reason"], line["message"])
+        lines.append({**line, "time": seen.get(identity, round(time.time(), 3))})
+    write_lines(path, lines)
+
+
+def refusal_json(refusal: Refusal) -> dict[str, Any]:
+    """JSON object of a refusal."""
+    return {**vars(refusal), "reason": str(refusal.reason), "details": dict(refusal.details)}
+
+
+def refusal_from_json(record: Mapping[str, Any]) -> Refusal:
+    """Inverse of `refusal_json`; keys the runner added are passed over."""
+    names = ("unit", "source", "message", "details")
+    return Refusal(reason=Reason(record["reason"]), **{name: record[name] for name in names})
+
+
+@contextmanager
+def locked(folder: Path) -> Iterator[None]:
+    """Hold the folder against a second writer; the lock falls with the process, however it ends.
+
+    Raises:
+        ConfigError: another process holds it, or there can be no such folder.
+    """
+    with _lock_file(folder) as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise ConfigError(
+                f"{folder} is being written by another wsm process; wait for it, or use another --out"
+            ) from error
+        drop_torn_line(folder / LEDGER_FILE)
+        yield
+
+
+def _lock_file(folder: Path) -> TextIO:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        return (folder / ".lock").open("w")
+    except OSError as error:
+        if error.errno in (errno.ENOSPC, errno.EDQUOT):  # no fault of the request
+            raise
+        raise ConfigError(f"{folder} must be a folder that can be written ({error}); use another --out") from error
+
+
+def _entry_from_line(line: Mapping[str, Any]) -> LedgerEntry:
+    outcome = Outcome(
+        unit=line["unit"],
+        state=line["state"],
+        digest=line["digest"],
+        outputs=tuple(line["outputs"]),
+        facts=line["facts"],
+        refusals=tuple(refusal_from_json(record) for record in line["refusals"]),
+        seconds=line["seconds"],
+    )
+    sizes = tuple(line.get("sizes", ()))
+    return LedgerEntry(key=line["key"], outcome=outcome, sizes=sizes, stale=line.get("stale", False))

@@ -1,0 +1,389 @@
+"""Runs one stage: finds what is pending, has an engine do it, writes the ledger, keeps to the budget, finishes."""
+
+import errno
+import fnmatch
+import time
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from tqdm import tqdm
+
+from pipelines.running.budget import RefusalCount, count_refusals, over_budget, with_outcome
+from pipelines.running.engines.choice import Engine
+from pipelines.running.engines.local import run_local
+from pipelines.running.folder import (
+    PENDING_FILE,
+    QUARANTINE_FILE,
+    LedgerEntry,
+    StageRecord,
+    compact_ledger,
+    is_as_written,
+    ledger_appender,
+    locked,
+    read_ledger,
+    read_stage_record,
+    size_on_disk,
+    write_quarantine,
+    write_stage_record,
+)
+from pipelines.running.settings import config_json, differences, settings_of
+from pipelines.running.stage import REFUSED, Finished, Outcome, Settled, Stage, StageContext, Unit, refused
+from pipelines.running.stage_report import StageReport, stage_report
+from pipelines.running.upstream import pending_units, quarantine_of, upstream_records
+from wsm_data.errors import BudgetExceeded, ConfigError, DataError, WsmError
+from wsm_data.files.atomic import remove_temporaries
+from wsm_data.files.digest import digest_json
+from wsm_data.files.jsonlines import write_lines
+from wsm_data.schema.verdict import Refusal
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunOptions:
+    """What to run now. None of it is a setting: none of it changes the bytes of a unit.
+
+    Attributes:
+        workers: worker processes.
+        limit: at most this many pending units; 0 for all.
+        only: patterns of unit ids (`gibson_*/*`); empty for all.
+        dry_run: list what would be done and stop.
+        max_refused: what may be refused. Below 1 a share: of the listed units, and by itself of the parts that were
+            found in them (trajectories in a container), which is known when all selected units are settled. From 1 on
+            a number: of refused units and refused parts together. What `finish` refuses counts as parts.
+        fork: when the settings differ from those in the folder, use a folder beside it instead of stopping.
+        retry_refused: try refused units again although neither their input nor the settings changed.
+        quiet: no progress bar.
+    """
+
+    workers: int = 1
+    limit: int = 0
+    only: tuple[str, ...] = ()
+    dry_run: bool = False
+    max_refused: float = 0.1
+    fork: bool = False
+    retry_refused: bool = False
+    quiet: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Job:
+    """One run of a stage: what is listed, and what the ledger said when it began."""
+
+    stage: Stage[Any]
+    config: Any
+    out: Path
+    record: StageRecord
+    waits_for: tuple[str, ...]
+    units: Sequence[Unit]
+    keys: Mapping[str, str]
+    finish_inputs: Mapping[str, str]
+    ledger: dict[str, LedgerEntry]
+    options: RunOptions
+    engine: Engine
+
+    def settled(self) -> Settled:
+        """Outcomes under the present keys."""
+        outcomes = {
+            unit.id: self.ledger[unit.id].outcome
+            for unit in self.units
+            if unit.id in self.ledger and self.ledger[unit.id].key == self.keys[unit.id]
+        }
+        return Settled(outcomes=outcomes, pending=tuple(unit.id for unit in self.units if unit.id not in outcomes))
+
+
+def run_stage(
+    stage: Stage[Any], config: Any, out: Path, options: RunOptions | None = None, engine: Engine = run_local
+) -> StageReport:
+    """Bring a stage's folder up to date with its inputs.
+
+    A unit is done again when its inputs, the settings or its outputs are not what the ledger says. Killed at any
+    point, the next call goes on where this one was. Finished work is deleted only when its unit was done again, or is
+    not listed although no stage before this one has pending units, from which it might come back.
+
+    Raises:
+        ConfigError: the folder belongs to other settings, or is being written by another process; or `options.only`
+            matches nothing.
+        BudgetExceeded: more was refused than `options.max_refused` allows.
+        WsmError: the disk is full, or two units have one id.
+    """
+    options = options or RunOptions()
+    started = time.monotonic()
+    upstream = upstream_records(config)  # before the listing: what changes while that is read is seen as newer
+    waits_for = tuple(name for name in upstream if pending_units(Path(getattr(config, name))))
+    units = stage.list_units(config)
+    _require_unique(stage, units)
+    _require_match(stage, units, options.only)
+    record = _record(stage, config, upstream, len(units), options.workers)
+    out = _choose_folder(out, record, options.fork)
+    keys = {unit.id: unit_key(record, unit) for unit in units}
+    job = _Job(
+        stage=stage,
+        config=config,
+        out=out,
+        record=record,
+        waits_for=waits_for,
+        units=units,
+        keys=keys,
+        finish_inputs=stage.finish_inputs(config) if stage.finish_inputs else {},
+        ledger={},
+        options=options,
+        engine=engine,
+    )
+    if options.dry_run:
+        job.ledger.update(_standing(out))
+        return _report(job, _selected(job), 0.0)
+    with _full_disk_named(out), locked(out):
+        remove_temporaries(out)
+        job.ledger.update(_standing(out))
+        selected = _selected(job)
+        if selected or not _is_finished(job):
+            write_stage_record(out, record)  # unfinished from here to the end, for whoever reads it
+            _work(job, selected)
+            _finish(job)
+        else:
+            _keep_record_current(job)
+    return _report(job, selected, time.monotonic() - started)
+
+
+def _report(job: _Job, ran: Sequence[Unit], seconds: float) -> StageReport:
+    settled = job.settled()
+    known = {(one.unit, one.source, one.reason) for outcome in settled.outcomes.values() for one in outcome.refusals}
+    extra = [one for one in quarantine_of(job.out) if (one.unit, one.source, one.reason) not in known]
+    report = stage_report(job.stage.name, job.out, settled, [unit.id for unit in ran], seconds, extra)
+    return replace(report, waits_for=job.waits_for)
+
+
+def fingerprint(stage: Stage[Any], config: Any) -> str:
+    """Digest of what decides the bytes of a stage beside its inputs: name, version and settings."""
+    return digest_json({"name": stage.name, "version": stage.version, "settings": settings_of(config)})
+
+
+def unit_key(record: StageRecord, unit: Unit) -> str:
+    """Key under which a unit is settled: digest of its inputs' content, the stage's version and its settings."""
+    return digest_json({"fingerprint": record.fingerprint, "inputs": dict(unit.inputs)})
+
+
+def _require_unique(stage: Stage[Any], units: Sequence[Unit]) -> None:
+    twice = [unit for unit, count in Counter(unit.id for unit in units).items() if count > 1]
+    if twice:
+        raise WsmError(f"{stage.name}: unit ids must be unique, found twice: {', '.join(sorted(twice)[:5])}")
+
+
+def _require_match(stage: Stage[Any], units: Sequence[Unit], only: Sequence[str]) -> None:
+    unmatched = [one for one in only if not fnmatch.filter([unit.id for unit in units], one)]
+    if unmatched:
+        example = f"; ids look like {units[0].id}" if units else ""
+        raise ConfigError(f"{stage.name}: --only {' '.join(unmatched)} matches none of {len(units)} units{example}")
+
+
+def _record(
+    stage: Stage[Any], config: Any, upstream: Mapping[str, StageRecord], units: int, workers: int
+) -> StageRecord:
+    return StageRecord(
+        name=stage.name,
+        version=stage.version,
+        settings=settings_of(config),
+        config=config_json(config),
+        fingerprint=fingerprint(stage, config),
+        inputs={name: record.fingerprint for name, record in upstream.items()},
+        seen={name: record.finished for name, record in upstream.items()},
+        units=units,
+        workers=workers,
+    )
+
+
+def _choose_folder(out: Path, record: StageRecord, fork: bool) -> Path:
+    old = read_stage_record(out)
+    if old is None or old.fingerprint == record.fingerprint:
+        return out
+    if fork:
+        return out.with_name(f"{out.name}-{record.fingerprint[:8]}")
+    if old.name != record.name:
+        raise ConfigError(f"{out} holds the output of `wsm {old.name}`, not of `wsm {record.name}`; use another --out")
+    changes = differences(
+        {"version of the stage": old.version, **old.settings},
+        {"version of the stage": record.version, **record.settings},
+    )
+    raise ConfigError(
+        f"{out} was written with other settings of `wsm {record.name}`:\n  "
+        + "\n  ".join(changes)
+        + "\nUse the old settings, another --out, or --fork to write beside it."
+    )
+
+
+def _standing(out: Path) -> dict[str, LedgerEntry]:
+    """The last word on every unit whose outputs are as it left them; one whose outputs are not is pending again."""
+    return {unit: entry for unit, entry in read_ledger(out, with_stale=True).items() if _is_whole(out, entry)}
+
+
+def _is_whole(out: Path, entry: LedgerEntry) -> bool:
+    outputs = entry.outcome.outputs
+    sizes = entry.sizes or (None,) * len(outputs)
+    return all(is_as_written(out / output, size) for output, size in zip(outputs, sizes, strict=True))
+
+
+def _selected(job: _Job) -> list[Unit]:
+    """Pending units that the options ask for, in the order of the listing."""
+    only = job.options.only
+    chosen = [
+        unit
+        for unit in job.units
+        if not _is_settled(job, unit) and (not only or any(fnmatch.fnmatch(unit.id, one) for one in only))
+    ]
+    return chosen[: job.options.limit] if job.options.limit else chosen
+
+
+def _is_settled(job: _Job, unit: Unit) -> bool:
+    entry = job.ledger.get(unit.id)
+    if entry is None or entry.key != job.keys[unit.id]:
+        return False
+    return entry.outcome.state != REFUSED or not job.options.retry_refused
+
+
+def _work(job: _Job, selected: Sequence[Unit]) -> None:
+    again = {unit.id for unit in selected}
+    standing = [outcome for unit, outcome in job.settled().outcomes.items() if unit not in again]
+    count = replace(count_refusals(standing, len(job.units), job.stage.parts_fact), found=None)
+    _keep_to_budget(job, count)
+    work = partial(_process_batch, job.stage, job.config, StageContext(out=job.out))
+    hidden = job.options.quiet or not selected
+    with (
+        tqdm(total=len(selected), desc=job.stage.name, unit="unit", disable=hidden, dynamic_ncols=True) as bar,
+        ledger_appender(job.out) as append,
+        closing(
+            job.engine(_batches(selected, job.options.workers), work, job.options.workers)
+        ) as outcomes,  # no worker outlives the lock
+    ):
+        for outcome in outcomes:
+            job.ledger[outcome.unit] = append(LedgerEntry(key=job.keys[outcome.unit], outcome=outcome))
+            count = with_outcome(count, outcome)
+            bar.update()
+            _keep_to_budget(job, count)
+
+
+def _keep_to_budget(job: _Job, count: RefusalCount, extra: Sequence[Refusal] = ()) -> None:
+    exceeding = over_budget(job.options.max_refused, count)
+    if not exceeding:
+        return
+    _write_refusals(job, extra)
+    first = _refusals(job, extra)[0]
+    raise BudgetExceeded(
+        f"{job.stage.name}: {exceeding} were refused, more than --max-refused {job.options.max_refused:g} allows; the "
+        f"first is {first.unit} ({first.reason}: {first.message}), and all are in {job.out / QUARANTINE_FILE}. Mend "
+        "the source, or raise --max-refused and run the same command again: what is done is kept."
+    )
+
+
+def _batches(units: Sequence[Unit], workers: int) -> list[list[Unit]]:
+    """Units of one batch together, batches in the order in which they first appear.
+
+    For several workers those of most units come first, so that none is left with a large one at the end.
+    """
+    batches: dict[tuple[str, str], list[Unit]] = {}
+    for unit in units:
+        batches.setdefault(("batch", unit.batch) if unit.batch else ("unit", unit.id), []).append(unit)
+    ordered = list(batches.values())
+    return sorted(ordered, key=len, reverse=True) if workers > 1 else ordered
+
+
+def _process_batch(stage: Stage[Any], config: Any, context: StageContext, batch: Sequence[Unit]) -> Iterator[Outcome]:
+    """Outcomes of one batch, each with the time it took; runs inside a worker."""
+    left = {unit.id: unit for unit in batch}
+    started = time.perf_counter()
+    try:
+        with _full_disk_named(context.out):
+            for outcome in stage.process(batch, config, context):
+                if left.pop(outcome.unit, None) is None:
+                    raise RuntimeError(f"{stage.name} gave an outcome too many, for {outcome.unit}")
+                yield replace(outcome, seconds=time.perf_counter() - started)
+                started = time.perf_counter()
+    except DataError as error:
+        for unit in left.values():
+            yield replace(refused(unit, error), seconds=time.perf_counter() - started)
+        return
+    if left:
+        raise RuntimeError(f"{stage.name} gave no outcome for {', '.join(left)}")
+
+
+@contextmanager
+def _full_disk_named(folder: Path) -> Iterator[None]:
+    """Turn a write that found no room, wherever it was, into an error for a person."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+            raise
+        raise WsmError(
+            f"the disk of {folder} is full ({error}); free space and run the same command again: what is done is kept"
+        ) from error
+
+
+def _is_finished(job: _Job) -> bool:
+    """Whether `finish` came to its end for these very outcomes and upstream states, and what it wrote is there."""
+    old = read_stage_record(job.out)
+    if old is None or old.finished != _state(job):
+        return False
+    written = {PENDING_FILE: None, QUARANTINE_FILE: None, **old.outputs}
+    return all(is_as_written(job.out / output, size) for output, size in written.items())
+
+
+def _keep_record_current(job: _Job) -> None:
+    """Inputs may lie elsewhere than when the stage was finished: later stages find them through the record."""
+    old = read_stage_record(job.out)
+    if old is None:
+        return
+    new = replace(job.record, finished=old.finished, workers=old.workers, outputs=old.outputs)
+    if old != new:
+        write_stage_record(job.out, new)
+
+
+def _state(job: _Job) -> str:
+    settled = job.settled()
+    return digest_json(
+        [
+            *(
+                [unit, one.state, one.digest, [str(two.reason) for two in one.refusals]]
+                for unit, one in settled.outcomes.items()
+            ),
+            list(settled.pending),
+            dict(job.record.seen),
+            dict(job.finish_inputs),
+        ]
+    )
+
+
+def _finish(job: _Job) -> None:
+    """Write what belongs to no single unit, the record last."""
+    settled = job.settled()
+    end = job.stage.finish(job.config, StageContext(out=job.out), settled) if job.stage.finish else Finished()
+    outcomes = settled.outcomes.values()
+    _keep_to_budget(job, count_refusals(outcomes, len(job.units), job.stage.parts_fact, end.refusals), end.refusals)
+    _write_refusals(job, end.refusals)
+    compact_ledger(job.out, {unit: job.ledger[unit] for unit in settled.outcomes}, _stale(job))
+    write_lines(job.out / PENDING_FILE, [{"unit": unit} for unit in settled.pending])
+    outputs = {output: size_on_disk(job.out / output) for output in end.outputs}
+    write_stage_record(job.out, replace(job.record, finished=_state(job), outputs=outputs))
+
+
+def _stale(job: _Job) -> dict[str, LedgerEntry]:
+    """Finished work that is no result now, and may be one again without being done again.
+
+    A unit is not listed when the upstream unit it follows from is pending, such as the trajectories of a container that
+    a limited run did not come to; only once nothing is pending before this stage has it left the source.
+    """
+    settled = job.settled()
+    may_return = set(job.ledger) if job.waits_for else set(settled.pending)
+    return {unit: entry for unit, entry in job.ledger.items() if unit in may_return and unit not in settled.outcomes}
+
+
+def _write_refusals(job: _Job, extra: Sequence[Refusal]) -> None:
+    write_quarantine(job.out, job.record, _refusals(job, extra))
+
+
+def _refusals(job: _Job, extra: Sequence[Refusal]) -> list[Refusal]:
+    outcomes = job.settled().outcomes.values()
+    return [*(refusal for outcome in outcomes for refusal in outcome.refusals), *extra]

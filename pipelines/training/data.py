@@ -1,0 +1,101 @@
+"""From releases to what the model is fed with, and what is told of them."""
+
+import logging
+from dataclasses import replace
+
+import torch
+
+from pipelines.training.config import TrainRunConfig
+from wsm_data.access.release import open_release
+from wsm_data.errors import ConfigError
+from wsm_data.loaders.config import Arrangement, LoaderConfig, OrderConfig, ReadConfig, Remainder, SourceConfig
+from wsm_data.loaders.loader import ClipLoader
+from wsm_data.shards.manifest import ReleaseManifest
+from wsm_model.config import ModelConfig
+from wsm_model.model_file import LatentStandard
+from wsm_model.presets import preset
+
+_LOG = logging.getLogger(__name__)
+
+
+def training_loader(
+    config: TrainRunConfig, device: torch.device, ledger: str, rank: int, world_size: int
+) -> ClipLoader:
+    """The loader of this rank, with its ledger in the run's folder.
+
+    Raises:
+        ConfigError: the settings do not fit the releases, or would leave a rank without rows.
+        IntegrityError: a release is damaged.
+    """
+    if world_size > 1 and config.order.remainder is Remainder.PAD:
+        raise ConfigError(
+            "order.remainder = pad leaves ranks of the last step without rows, and the others would wait for them for "
+            "ever; choose drop or repeat"
+        )
+    is_pinned = device.type == "cuda" and not config.read.workers  # batches of workers come through shared memory
+    read = replace(config.read, device=str(device), pin_memory=is_pinned)
+    settings = LoaderConfig(sources=config.sources, order=config.order, read=read, ledger=ledger)
+    return ClipLoader(settings, rank=rank, world_size=world_size)
+
+
+def held_out_loader(config: TrainRunConfig, device: torch.device) -> ClipLoader | None:
+    """Clips of the first source that are not trained on, one by one; None where its release has none.
+
+    They come in an order of their own, always the same, so that a few of them are not all of one scene.
+    """
+    held_out, source = config.held_out, config.sources[0]
+    manifest = open_release(source.release).manifest
+    if not manifest.clips_by_split.get(held_out.split):
+        _LOG.warning("release %s has no clips of the split %r: nothing is held out", manifest.name, held_out.split)
+        return None
+    order = OrderConfig(
+        shuffle=True,
+        global_batch=1,
+        remainder=Remainder.DROP,
+        arrangement=Arrangement.PLAIN,
+        max_latents=held_out.max_latents,
+        chunk_sizes=(held_out.session.chunk_size,),
+    )
+    settings = LoaderConfig(
+        sources=(SourceConfig(release=source.release, split=held_out.split),),
+        order=order,
+        read=ReadConfig(device=str(device), threads=1, prefetch_batches=1),
+    )
+    return ClipLoader(settings, rank=0, world_size=1)
+
+
+def model_config(config: TrainRunConfig, manifest: ReleaseManifest) -> ModelConfig:
+    """The chosen size for the latents of a release: their channels, rows and columns.
+
+    Raises:
+        ConfigError: there is no such size, or the latents cannot be cut into patches.
+    """
+    ratio = manifest.codec.spatial_ratio
+    height, width = manifest.encoded_height_px // ratio, manifest.encoded_width_px // ratio
+    try:
+        found = preset(config.model.size, latent_height=height, latent_width=width, variant=config.model.variant)
+    except ValueError as error:
+        raise ConfigError(f"release {manifest.name} does not fit the model: {error}") from error
+    return replace(found, latent_channels=manifest.codec.channels)
+
+
+def latent_standard(manifest: ReleaseManifest) -> LatentStandard:
+    """How the loader standardises latents of this release: RGB by the codec where it has statistics of its own.
+
+    Raises:
+        ConfigError: the release has no statistics.
+    """
+    codec, rgb, depth = manifest.codec, manifest.rgb_statistics, manifest.depth_statistics
+    if not depth.mean or not (codec.latent_mean or rgb.mean):
+        raise ConfigError(
+            f"release {manifest.name} must have latent statistics to standardise by, but it was packed without "
+            "training clips; name a release with a split `train` first"
+        )
+    return LatentStandard(
+        codec=codec.name,
+        codec_digest=codec.digest,
+        rgb_mean=codec.latent_mean or rgb.mean,
+        rgb_std=codec.latent_std or rgb.std,
+        depth_mean=depth.mean,
+        depth_std=depth.std,
+    )

@@ -1,0 +1,161 @@
+"""Pictures of a training run: its curves, and what the model makes of a held-out clip."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from pipelines.training.config import HeldOutConfig
+from wsm_data.codecs.base import VideoCodec
+from wsm_data.codecs.depth import depth_m_from_latent_video
+from wsm_data.files.jsonlines import read_lines
+from wsm_data.loaders.batches.batch import Batch
+from wsm_data.schema.depth import DepthRange
+from wsm_data.view.clip_pictures import spread_frames
+from wsm_data.view.dream_sheet import DreamSheet, draw_dream_sheet
+from wsm_data.view.training_curves import draw_training_curves
+from wsm_model.config import Variant
+from wsm_model.inference.passes import StateEstimate
+from wsm_model.inference.sampler import flow_schedule
+from wsm_model.inference.session import Session
+from wsm_model.losses.pose import raw_frame_poses
+from wsm_model.model import WorldSlamModel
+from wsm_model.model_file import LatentStandard
+
+CURVE_UNITS = {
+    "loss": "weighted sum (1)",
+    "flow": "squared velocity error (1)",
+    "depth": "squared latent error (1)",
+    "pose_absolute": "smooth L1 (m and 1)",
+    "pose_relative": "smooth L1 (m and 1)",
+    "learning_rate": "base learning rate (1)",
+}
+_FRAMES_SHOWN = 5
+_SEEN_SHARE = 0.5
+"""Share of a clip that is seen before the dream begins."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Decoding:
+    """What turns latents of a release into pictures.
+
+    Attributes:
+        codec: of the release.
+        standard: how its latents are standardised.
+        depth_range: of its depth.
+    """
+
+    codec: VideoCodec
+    standard: LatentStandard
+    depth_range: DepthRange
+
+    def rgb_u8(self, latents: Tensor) -> np.ndarray:
+        """Standardised RGB latents [F, C, h, w] as pictures, uint8 [T, H, W, 3]."""
+        video = self.codec.decode(_raw(latents, self.standard.rgb_mean, self.standard.rgb_std))
+        return np.round((np.clip(video, -1.0, 1.0) + 1.0) * 127.5).astype(np.uint8)
+
+    def depth_m(self, latents: Tensor) -> np.ndarray:
+        """Standardised depth latents [F, C, h, w] as metres, float32 [T, H, W]."""
+        video = self.codec.decode(_raw(latents, self.standard.depth_mean, self.standard.depth_std))
+        return depth_m_from_latent_video(video, self.depth_range)
+
+
+def draw_curves(run: Path) -> None:
+    """Write curves.png of a run's metrics."""
+    records = list(read_lines(run / "metrics.jsonl"))
+    if records:
+        draw_training_curves(records, CURVE_UNITS, run / "curves.png")
+
+
+def draw_dream(
+    model: WorldSlamModel,
+    batch: Batch,
+    decoding: Decoding,
+    config: HeldOutConfig,
+    path: Path | None,
+    *,
+    shift: float,
+    title: str,
+) -> None:
+    """See the first half of a clip, dream a chunk, and draw both beside the truth.
+
+    Without SLAM the true poses of what is seen are given, and there is no depth to draw.
+
+    Args:
+        model: any number of ranks may call this with the same clip.
+        batch: one clip.
+        decoding: of its release.
+        config: chunk size and sampler steps.
+        path: where the PNG goes; None on ranks that only take part.
+        shift: gamma of the flow time.
+        title: of the sheet.
+    """
+    rgb, length = batch.rgb[0].float(), int(batch.lengths[0])
+    chunk = config.session.chunk_size
+    seen = max(1, min(length - chunk, int(length * _SEEN_SHARE)))
+    end = min(length, seen + chunk)
+    session = Session(model, config.session)
+    depth, poses = torch.zeros_like(rgb[:end]), torch.zeros_like(batch.poses[0, :end].float())
+    for number, latent in enumerate(rgb[:seen]):
+        states = session.observe(latent[None], _issued_poses(model, batch, number))
+        place = slice(states.first, states.first + states.poses.shape[1])
+        poses[place] = states.poses[0]
+        if states.depth is not None:
+            depth[place] = states.depth[0]
+    noise = torch.randn(1, end - seen, *rgb.shape[1:], generator=torch.Generator().manual_seed(0)).to(rgb.device)
+    dream = session.dream(batch.goal_camera0_m[:1].float(), noise, flow_schedule(config.flow_steps, shift))
+    if path is None:
+        return
+    poses[seen:] = dream.states.poses[0]
+    estimated = None
+    if dream.states.depth is not None:
+        estimated = torch.cat([depth[:seen], dream.states.depth[0]])
+    _draw(path, batch, decoding, title, seen=seen, end=end, dreamed=dream.rgb[0], depth=estimated, poses=poses)
+
+
+def _issued_poses(model: WorldSlamModel, batch: Batch, latent: int) -> StateEstimate | None:
+    """The true poses of a latent, where the model must be told them."""
+    if model.config.variant is Variant.SLAM:
+        return None
+    return StateEstimate(first=latent, depth=None, poses=batch.poses[:1, latent : latent + 1].float())
+
+
+def _draw(
+    path: Path,
+    batch: Batch,
+    decoding: Decoding,
+    title: str,
+    *,
+    seen: int,
+    end: int,
+    dreamed: Tensor,
+    depth: Tensor | None,
+    poses: Tensor,
+) -> None:
+    true_rgb, true_depth = batch.rgb[0, :end].float(), batch.depth[0, :end].float()
+    first = 4 * (seen - 1) + 1  # the first raw frame of the dream
+    frames = [first + one for one in spread_frames(4 * (end - seen), _FRAMES_SHOWN)]
+    with_dream = torch.cat([true_rgb[:seen], dreamed])
+    true_m, estimated_m = (
+        raw_frame_poses(slots.float())[:, :3].double().cpu().numpy() for slots in (batch.poses[0, :end], poses)
+    )
+    sheet = DreamSheet(
+        title=f"{title}: {batch.keys[0]}, {4 * (seen - 1) + 1} frames seen, {4 * (end - seen)} dreamed",
+        frames=tuple(frames),
+        true_rgb_u8=decoding.rgb_u8(true_rgb)[frames],
+        dreamed_rgb_u8=decoding.rgb_u8(with_dream)[frames],
+        true_depth_m=decoding.depth_m(true_depth)[frames],
+        estimated_depth_m=None if depth is None else decoding.depth_m(depth)[frames],
+        depth_range=decoding.depth_range,
+        true_path_m=true_m,
+        estimated_path_m=estimated_m[:first],
+        dreamed_path_m=estimated_m[first - 1 :],
+    )
+    draw_dream_sheet(sheet, path)
+
+
+def _raw(latents: Tensor, mean: tuple[float, ...], std: tuple[float, ...]) -> np.ndarray:
+    scale, offset = (np.array(values, np.float32)[:, None, None] for values in (std, mean))
+    return latents.float().cpu().numpy() * scale + offset

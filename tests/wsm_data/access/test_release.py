@@ -1,0 +1,231 @@
+import re
+import shutil
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import fsspec
+import numpy as np
+import pytest
+
+from wsm_data.access.release import open_release
+from wsm_data.access.verify import verify_release
+from wsm_data.errors import ConfigError, IntegrityError
+from wsm_data.files.stores import LocalStore
+from wsm_data.schema.clip import MEMBERS, Clip
+from wsm_data.shards.index import write_index
+from wsm_data.shards.index_row import SCHEMA
+from wsm_data.shards.manifest import manifest_bytes, release_digest
+
+
+@pytest.fixture
+def in_memory(tiny: SimpleNamespace) -> Iterator[str]:
+    """URL of a copy of the release in fsspec's memory store."""
+    filesystem = fsspec.filesystem("memory")
+    for path in tiny.folder.iterdir():
+        filesystem.pipe(f"/shards-test/{path.name}", path.read_bytes())
+    yield "memory://shards-test"
+    filesystem.rm("/shards-test", recursive=True)
+
+
+def test_every_clip_comes_back_to_the_bit(tiny: SimpleNamespace) -> None:
+    release = open_release(tiny.folder)
+    for clip in tiny.clips:
+        read = release.read_clip(clip.meta.key)
+        assert read.meta == clip.meta
+        assert all(read.arrays()[name].tobytes() == array.tobytes() for name, array in clip.arrays().items())
+
+
+def test_a_release_is_read_and_verified_from_a_store(in_memory: str, tiny: SimpleNamespace) -> None:
+    release = open_release(in_memory)
+    clip = tiny.clips[4]
+    np.testing.assert_array_equal(release.read_clip(clip.meta.key).rgb_latent, clip.rgb_latent)
+    assert verify_release(in_memory) == []
+
+
+def test_a_clip_costs_one_ranged_read_and_no_copy(tiny: SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> None:
+    release = open_release(tiny.folder)
+    reads: list[bytes] = []
+    original = LocalStore.read_range
+
+    def counted(store: LocalStore, name: str, offset: int, size: int) -> bytes:
+        reads.append(original(store, name, offset, size))
+        return reads[-1]
+
+    monkeypatch.setattr(LocalStore, "read_range", counted)
+    clip = release.read_clip(tiny.clips[0].meta.key)
+    [data] = reads
+    buffer = np.frombuffer(data, np.uint8)
+    assert all(np.shares_memory(array, buffer) for array in clip.arrays().values())
+
+
+def test_manifest_inventory_and_quarantine_are_at_hand(tiny: SimpleNamespace) -> None:
+    release = open_release(str(tiny.folder))
+    assert release.manifest == tiny.manifest
+    assert [row.unit for row in release.inventory if row.reason] == [line["unit"] for line in release.quarantine]
+
+
+def test_a_folder_without_manifest_is_unfinished(tiny: SimpleNamespace) -> None:
+    (tiny.folder / "dataset.json").unlink()
+    with pytest.raises(IntegrityError, match="the release is unfinished"):
+        open_release(tiny.folder)
+
+
+@pytest.mark.parametrize("inside", ["pack/release", "release"])
+def test_the_folder_of_a_run_is_refused_with_the_place_of_its_release(
+    inside: str, tiny: SimpleNamespace, tmp_path: Path
+) -> None:
+    shutil.copytree(tiny.folder, tmp_path / "run" / inside)
+    with pytest.raises(ConfigError, match=f"is no release, but holds one: give {tmp_path / 'run' / inside}$"):
+        open_release(tmp_path / "run")
+
+
+@pytest.mark.parametrize("content", [b"", b"[]", b"{}", b"\xff\x00"])
+def test_a_manifest_that_is_none_says_what_to_do(content: bytes, tiny: SimpleNamespace) -> None:
+    (tiny.folder / "dataset.json").write_bytes(content)
+    with pytest.raises(IntegrityError, match=r"Fetch the release again, or write it again with `wsm pack`$"):
+        open_release(tiny.folder)
+
+
+@pytest.mark.parametrize("place", ["nowhere", "memory://nowhere-at-all"])
+def test_no_folder_is_a_wrong_request(place: str, tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="there is no release at"):
+        open_release(place if "://" in place else tmp_path / place)
+
+
+def test_another_schema_version_is_refused(tiny: SimpleNamespace) -> None:
+    (tiny.folder / "dataset.json").write_bytes(manifest_bytes(replace(tiny.manifest, schema_version=7)))
+    with pytest.raises(IntegrityError, match="schema_version must be 1, found 7"):
+        open_release(tiny.folder)
+
+
+def test_an_index_that_was_changed_or_removed_is_refused(tiny: SimpleNamespace) -> None:
+    path = tiny.folder / "index.parquet"
+    path.write_bytes(path.read_bytes() + b"\0")
+    with pytest.raises(IntegrityError, match=r"index\.parquet must have sha256"):
+        open_release(tiny.folder)
+    path.unlink()
+    with pytest.raises(IntegrityError, match=r"index\.parquet is missing"):
+        open_release(tiny.folder)
+
+
+def test_an_index_that_is_replaced_later_is_not_believed(tiny: SimpleNamespace, tmp_path: Path) -> None:
+    release = open_release(tiny.folder)
+    write_index(tmp_path / "other", SCHEMA.empty_table())
+    (tmp_path / "other").replace(tiny.folder / "index.parquet")
+    with pytest.raises(IntegrityError, match="was changed since the release was opened; open the release again"):
+        release.index.texts("key")
+
+
+def test_a_release_knows_its_digest(tiny: SimpleNamespace) -> None:
+    assert open_release(tiny.folder).digest == release_digest(tiny.manifest)
+
+
+def test_an_index_of_another_length_than_counted_is_refused(tiny: SimpleNamespace) -> None:
+    (tiny.folder / "dataset.json").write_bytes(manifest_bytes(replace(tiny.manifest, clips=8)))
+    with pytest.raises(IntegrityError, match="counts 8 clips, the index has 7 rows"):
+        open_release(tiny.folder)
+
+
+@pytest.mark.parametrize("name", ["inventory.parquet", "quarantine.jsonl"])
+def test_a_changed_inventory_or_quarantine_is_refused_when_asked_for(tiny: SimpleNamespace, name: str) -> None:
+    (tiny.folder / name).write_bytes((tiny.folder / name).read_bytes() + b"\n")
+    release = open_release(tiny.folder)
+    with pytest.raises(IntegrityError, match=f"{name} must have sha256"):
+        getattr(release, name.partition(".")[0])
+
+
+@pytest.mark.parametrize("name", [*MEMBERS, "meta"])
+def test_a_damaged_member_is_named_with_shard_and_clip(tiny: SimpleNamespace, name: str) -> None:
+    release = open_release(tiny.folder)
+    row = release.index.row(tiny.clips[2].meta.key)
+    member = next(member for member in row.members if member.name == name)
+    path = tiny.folder / row.shard
+    data = bytearray(path.read_bytes())
+    data[row.clip_offset + member.array_offset + member.array_size // 2] ^= 0x10
+    path.write_bytes(data)
+    with pytest.raises(IntegrityError, match=rf"{row.shard}, clip {row.key}: the checksum of {member.file_name}"):
+        release.read_clip(row.key)
+
+
+def test_a_shard_that_is_cut_or_missing_is_named(tiny: SimpleNamespace) -> None:
+    release = open_release(tiny.folder)
+    row = release.index.row(tiny.clips[2].meta.key)
+    path = tiny.folder / row.shard
+    path.write_bytes(path.read_bytes()[: row.clip_offset + 700])
+    with pytest.raises(IntegrityError, match=rf"{row.shard}, clip {row.key}: the clip must end at byte"):
+        release.read_clip(row.key)
+    path.unlink()
+    with pytest.raises(IntegrityError, match=rf"{row.shard}, clip {row.key}: the shard is missing"):
+        release.read_clip(row.key)
+
+
+@pytest.mark.parametrize("cut", [True, False], ids=["cut", "whole"])
+def test_a_store_that_fails_behind_the_end_does_not_hide_a_cut_shard(
+    tiny: SimpleNamespace, monkeypatch: pytest.MonkeyPatch, cut: bool
+) -> None:
+    release = open_release(tiny.folder)
+    row = release.index.row(tiny.clips[2].meta.key)
+    if cut:
+        path = tiny.folder / row.shard
+        path.write_bytes(path.read_bytes()[: row.clip_offset])
+
+    def failing(*_: object) -> bytes:
+        raise OSError("416 Range Not Satisfiable")
+
+    monkeypatch.setattr(LocalStore, "read_range", failing)
+    with pytest.raises(IntegrityError if cut else OSError, match="must end at byte" if cut else "416"):
+        release.read_clip(row.key)
+
+
+def test_an_answer_cut_short_by_the_store_is_told_from_a_cut_shard(
+    tiny: SimpleNamespace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    release = open_release(tiny.folder)
+    monkeypatch.setattr(LocalStore, "read_range", lambda store, name, offset, size: bytes(size - 1))
+    with pytest.raises(IntegrityError, match="read it again"):
+        release.read_clip(tiny.clips[0].meta.key)
+
+
+def test_unchecked_bytes_are_still_a_valid_clip_or_refused(tiny: SimpleNamespace) -> None:
+    release = open_release(tiny.folder)
+    row = release.index.row(tiny.clips[0].meta.key)
+    path = tiny.folder / row.shard
+    data = bytearray(path.read_bytes())
+    poses = next(member for member in row.members if member.name == "poses")
+    place = row.clip_offset + poses.array_offset
+    data[place : place + 4] = np.float32(np.nan).tobytes()
+    path.write_bytes(data)
+    with pytest.raises(IntegrityError, match="poses must be finite"):
+        release.read_clip(row.key, verify=False)
+
+
+def test_another_codec_is_refused_by_both_names(tiny: SimpleNamespace) -> None:
+    release = open_release(tiny.folder)
+    release.require_codec(tiny.codec)
+    with pytest.raises(ConfigError, match=r"encoded with dct \(digest c0dec\).*found wan \(digest w\)"):
+        release.require_codec(replace(tiny.codec, name="wan", digest="w"))
+
+
+def test_a_clip_of_another_codec_than_the_release_is_refused(tiny: SimpleNamespace) -> None:
+    release = open_release(tiny.folder)
+    manifest = replace(release.manifest, codec=replace(tiny.codec, digest="other"))
+    with pytest.raises(IntegrityError, match="codec digest other, found"):
+        replace(release, manifest=manifest).read_clip(tiny.clips[0].meta.key)
+
+
+def test_a_clip_that_is_not_there_is_a_wrong_request(tiny: SimpleNamespace, make_clip: Callable[..., Clip]) -> None:
+    with pytest.raises(ConfigError, match="has no clip 'a/b/c'"):
+        open_release(tiny.folder).read_clip("a/b/c")
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # webdataset leaves its file open
+def test_the_snippets_of_the_documentation_run_beside_a_release(
+    tiny: SimpleNamespace, format_document: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tiny.folder.parent)
+    snippets = re.findall(r"```python\n(.*?)```", format_document, re.DOTALL)
+    assert len(snippets) == 4
+    for number, snippet in enumerate(snippets):
+        exec(compile(snippet, f"docs/format.md, snippet {number}", "exec"), {})  # noqa: S102 - our own document

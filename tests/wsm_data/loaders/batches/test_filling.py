@@ -1,0 +1,93 @@
+import numpy as np
+import pytest
+import torch
+
+from wsm_data.loaders.batches.batch import PackedBatch
+from wsm_data.loaders.batches.filling import arrange, batch_layout, describe, slots_of
+from wsm_data.loaders.config import Arrangement, OrderConfig, SourceConfig
+from wsm_data.loaders.reading.clip_places import clip_places
+from wsm_data.loaders.sources.clips import open_sources
+
+LATENT_SHAPE = (48, 6, 10)
+
+
+@pytest.fixture
+def plan_of(released):
+    sources = open_sources([SourceConfig(release=str(released.folder))])
+
+    def plan(**settings):
+        return sources, sources.plan(OrderConfig(**({"global_batch": 4} | settings)), 0)
+
+    return plan
+
+
+def _arranged(sources, plan, step=0):
+    rows = plan.rows(step, 0, 1)
+    clips = arrange(rows, clip_places(sources, np.concatenate(rows)), plan)
+    return rows, clips, batch_layout(clips, len(rows), plan, LATENT_SHAPE, torch.float16)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [{}, {"max_latents": 2}, {"arrangement": Arrangement.PACK, "row_latents": 8, "global_batch": 2}],
+    ids=str,
+)
+def test_the_clips_of_a_row_lie_one_behind_the_other(plan_of, settings):
+    sources, plan = plan_of(**settings)
+    for step in range(plan.steps):
+        rows, clips, layout = _arranged(sources, plan, step)
+        assert [clip.place.key for clip in clips] == sources.keys(np.concatenate(rows))
+        ends = dict.fromkeys(range(len(rows)), 0)
+        for clip in clips:
+            assert clip.start == ends[clip.row]
+            assert clip.latents == min(clip.place.latents, settings.get("max_latents", 99))
+            ends[clip.row] += clip.latents
+        assert layout.row_latents == (settings.get("row_latents") or max(ends.values()))
+        assert (layout.rows, layout.sequences) == (len(rows), len(clips))
+
+
+def test_slots_of_different_clips_and_tensors_lie_apart(plan_of):
+    """What is written through the slots of one clip arrives in its latents of each tensor, and nowhere else."""
+    sources, plan = plan_of(arrangement=Arrangement.PACK, row_latents=8, global_batch=2)
+    _, clips, layout = _arranged(sources, plan)
+    assert len(clips) > 2
+    packed = PackedBatch(
+        block=torch.zeros(layout.size_bytes, dtype=torch.uint8), layout=layout, keys=(), epoch=0, step=0
+    )
+    memory = memoryview(packed.block.numpy())
+    for clip in clips:
+        slots = slots_of(layout, memory, clip)
+        for name, slot in slots.items():
+            slot[:] = bytes([1]) * slot.nbytes
+            written = packed.block.numpy().sum()
+            assert written == slot.nbytes
+            values = packed.tensors()[name]
+            own = values[clip.row, clip.start : clip.start + clip.latents]
+            own = own.flatten(0, 1)[3:] if name == "poses" else own
+            assert own.contiguous().view(torch.uint8).sum() == written
+            slot[:] = bytes(slot.nbytes)
+
+
+def test_describing_says_all_that_is_not_read_whatever_the_memory_held_before(plan_of, expected_batch, released):
+    sources, plan = plan_of(arrangement=Arrangement.PACK, row_latents=7, global_batch=2)
+    padded = 0
+    for step in range(plan.steps):
+        rows, clips, layout = _arranged(sources, plan, step)
+        block = torch.full((layout.size_bytes,), 255, dtype=torch.uint8)
+        keys = tuple(clip.place.key for clip in clips)
+        refs, drawn = np.concatenate(rows), np.arange(len(clips))
+        goals = [released.clips[key].poses[-1, :3] for key in keys]
+        describe(layout, memoryview(block.numpy()), clips, refs=refs, chunk_size=drawn, goals=goals)
+        batch = PackedBatch(block=block, layout=layout, keys=keys, epoch=0, step=step).unpacked()
+        expected = expected_batch(batch, released.clips, row_latents=7)
+        for name in ("still", "sequence_id", "latent_index", "goal_camera0_m"):
+            np.testing.assert_array_equal(getattr(batch, name), expected[name], err_msg=name)
+        assert batch.refs.tolist() == refs.tolist()
+        assert batch.chunk_size.tolist() == drawn.tolist()
+        padding = batch.sequence_id < 0
+        padded += int(padding.sum())
+        for values in (batch.rgb, batch.depth, batch.depth_valid, batch.poses):
+            assert not values[padding].any()
+        for clip in clips:
+            assert batch.poses[clip.row, clip.start, :3].tolist() == [[0, 0, 0, 1, 0, 0, 0]] * 3
+    assert padded

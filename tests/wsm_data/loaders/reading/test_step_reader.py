@@ -1,0 +1,116 @@
+import numpy as np
+import pytest
+import torch
+
+from wsm_data.errors import ConfigError
+from wsm_data.loaders.batches.batch import Batch
+from wsm_data.loaders.config import Arrangement, ReadConfig, Remainder, SourceConfig
+from wsm_data.loaders.order.epoch_plan import chunk_sizes
+from wsm_data.loaders.reading.step_reader import StepReader
+from wsm_data.loaders.sources.clips import open_sources
+
+STORED = {"standardise": False, "dtype": "float16"}
+
+
+def _require_equal(batch: Batch, expected: dict[str, np.ndarray]) -> None:
+    for name, array in expected.items():
+        found = getattr(batch, name).numpy()
+        assert found.dtype == array.dtype, name
+        np.testing.assert_array_equal(found, array, err_msg=name)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {},
+        {"max_latents": 3},
+        {"max_latents": 1},
+        {"verify": "never", "max_latents": 2},
+        {"verify": "always"},
+        {"arrangement": Arrangement.BUCKET, "pool": 3},
+        {"arrangement": Arrangement.PACK, "row_latents": 9, "global_batch": 2},
+        {"arrangement": Arrangement.PACK, "row_latents": 9, "global_batch": 2, "max_latents": 4, "verify": "never"},
+        {"remainder": Remainder.PAD},
+    ],
+    ids=str,
+)
+def test_batches_hold_what_the_clips_hold(released, make_loader, expected_batch, settings):
+    """Twice, so that prefixes are read once with checksums and once without; every buffer has been used before then."""
+    loader = make_loader(**STORED, **settings)
+    count = 0
+    for _ in range(2):
+        for batch in loader:
+            _require_equal(batch, expected_batch(batch, released.clips, settings.get("row_latents", 0)))
+            count += len(batch.keys)
+    assert count > released.release.manifest.clips
+
+
+def test_rows_are_those_of_the_plan(released, make_loader):
+    loader = make_loader(**STORED, arrangement=Arrangement.PACK, row_latents=9, global_batch=2)
+    plan = loader.plan
+    for batch in loader:
+        rows = plan.rows(batch.step, 0, 1)
+        assert batch.refs.tolist() == np.concatenate(rows).tolist()
+        assert batch.row.tolist() == [row for row, refs in enumerate(rows) for _ in refs]
+        assert batch.keys == tuple(loader.sources.keys(batch.refs.numpy()))
+        assert batch.chunk_size.tolist() == chunk_sizes(batch.refs.numpy(), plan.order, plan.epoch).tolist()
+        assert batch.epoch == plan.epoch == 0
+
+
+def test_a_batch_of_padding_alone_has_one_latent_and_no_sequence(make_loader):
+    loader = make_loader(**STORED, remainder=Remainder.PAD, global_batch=8, rank=3, world_size=4, shuffle=False)
+    *_, last = loader
+    assert last.keys == ()
+    assert last.rgb.shape[:2] == (2, 1)
+    assert not last.rgb.any()
+    assert not last.poses.any()
+    assert (last.sequence_id == -1).all()
+    assert last.goal_camera0_m.shape == (0, 3)
+
+
+def _standardised(stored: np.ndarray, mean: tuple[float, ...], std: tuple[float, ...]) -> np.ndarray:
+    column = (slice(None), None, None)
+    centred = stored.astype(np.float32) - np.array(mean).astype(np.float32)[column]
+    return centred * (1 / np.array(std)).astype(np.float32)[column]
+
+
+@pytest.mark.parametrize("dtype", ["float32", "bfloat16", "float16"])
+@pytest.mark.parametrize("threads", [0, 2])
+def test_latents_are_standardised_to_the_bit_and_padding_stays_zero(
+    released, make_loader, expected_batch, dtype, threads
+):
+    manifest = released.release.manifest
+    moments = {"rgb": manifest.rgb_statistics, "depth": manifest.depth_statistics}
+    for batch in make_loader(dtype=dtype, threads=threads):
+        expected = expected_batch(batch, released.clips)
+        for name, statistics in moments.items():
+            values = _standardised(expected.pop(name), statistics.mean, statistics.std)
+            values[expected["sequence_id"] < 0] = 0
+            assert torch.equal(getattr(batch, name), torch.from_numpy(values).to(getattr(torch, dtype)))
+        _require_equal(batch, expected)
+
+
+def test_without_standardising_only_the_dtype_changes(released, make_loader, expected_batch):
+    for batch in make_loader(standardise=False, dtype="float32"):
+        expected = expected_batch(batch, released.clips)
+        assert torch.equal(batch.rgb, torch.from_numpy(expected["rgb"]).float())
+
+
+def test_stored_latents_come_without_a_copy(released, make_loader):
+    """The arrays of a batch lie in the one block that its clips were read into."""
+    batch = next(iter(make_loader(**STORED)))
+    tensors = [value for value in vars(batch).values() if isinstance(value, torch.Tensor)]
+    assert len({tensor.untyped_storage().data_ptr() for tensor in tensors}) == 1
+
+
+def test_a_dtype_that_latents_cannot_have_is_refused(released):
+    sources = open_sources([SourceConfig(release=str(released.folder))])
+    with pytest.raises(ConfigError, match="dtype must be one of float32, bfloat16, float16, found 'int8'"):
+        StepReader(sources, ReadConfig(dtype="int8"), rank=0, world_size=1)
+
+
+def test_two_sources_of_one_release_share_its_reader(released):
+    sources = open_sources([SourceConfig(release=str(released.folder)), SourceConfig(release=str(released.folder))])
+    reader = StepReader(sources, ReadConfig(), rank=0, world_size=1)
+    assert reader._readers[0] is reader._readers[1]
+    reader.close()

@@ -1,0 +1,119 @@
+"""Do the depth images of a trajectory fit its poses? Looked at in a few pairs of frames, at their stored size."""
+
+import logging
+from collections.abc import Mapping, Sequence
+from itertools import chain
+
+import numpy as np
+
+from wsm_data.checks.depth_agreement import check_depth_agreement
+from wsm_data.checks.gate import require_kept
+from wsm_data.codecs.depth import depth_m_from_raw
+from wsm_data.codecs.images import decode_depth
+from wsm_data.errors import DataError
+from wsm_data.geometry.transform import invert, rotation_angle_rad
+from wsm_data.readers.frames import EpisodeFrames
+from wsm_data.schema.arrays import Float32Array, Float64Array
+from wsm_data.schema.dataset import DatasetManifest
+from wsm_data.schema.episode import EpisodeRecord
+from wsm_data.schema.verdict import Verdict
+
+_LOG = logging.getLogger(__name__)
+
+SPACING_M = 0.5
+"""Way between the frames of a pair: wrong axes show, and most of the view is shared."""
+
+TURN_M_PER_RAD = 1.0
+"""A turn counts as way too: 29 degrees are a pair's spacing, and leave about half of the view shared."""
+
+MAX_PAIRS = 7
+
+_ROUNDING_M = 1e-6
+"""Steps of 0.1 m add up to their multiples, but for this."""
+
+
+def require_depth_agreement(record: EpisodeRecord, frames: EpisodeFrames, dataset: DatasetManifest) -> None:
+    """Refuse a trajectory whose depth contradicts its poses.
+
+    Raises:
+        DataError: `pose.depth_disagree`, naming the camera axes or the offset that would fit; or a frame does not
+            decode.
+    """
+    pairs = spread_pairs(record, range(record.frame_count))
+    depth_m = {number: _depth_m(record, number, frames.depth[number], dataset) for number in sorted({*chain(*pairs)})}
+    require_kept(check_depth_agreement(record, depth_m, pairs, dataset.camera_axes))
+
+
+def agreeing_records(
+    records: Sequence[EpisodeRecord],
+    depth_samples: Mapping[str, tuple[tuple[int, bytes], ...]],
+    dataset: DatasetManifest,
+) -> list[EpisodeRecord]:
+    """The trajectories whose depth samples do not contradict their poses.
+
+    One that does would spoil the map that is fused for all of them; it is refused when it is encoded. Samples that do
+    not decode are not looked at here.
+
+    Args:
+        records: trajectories of a scene.
+        depth_samples: (frame number, PNG bytes) by trajectory.
+        dataset: conventions of the source.
+    """
+    kept = []
+    for record in records:
+        verdict = _samples_verdict(record, dict(depth_samples.get(record.id.text, ())), dataset)
+        if verdict.keep:
+            kept.append(record)
+        else:
+            _LOG.warning("left out of the map of its scene: %s", verdict.message)
+    return kept
+
+
+def _samples_verdict(record: EpisodeRecord, samples: Mapping[int, bytes], dataset: DatasetManifest) -> Verdict:
+    pairs = spread_pairs(record, sorted(samples))
+    depth_m: dict[int, Float32Array] = {}
+    for number in sorted({*chain(*pairs)}):
+        try:
+            depth_m[number] = _depth_m(record, number, samples[number], dataset)
+        except DataError:
+            continue
+    whole = [(a, b) for a, b in pairs if a in depth_m and b in depth_m]
+    return check_depth_agreement(record, depth_m, whole, dataset.camera_axes)
+
+
+def spread_pairs(record: EpisodeRecord, numbers: Sequence[int]) -> list[tuple[int, int]]:
+    """At most `MAX_PAIRS` pairs of frames, `SPACING_M` apart along the way, spread evenly from its start to its end.
+
+    Of the frames given, those are taken between which the wanted piece of the way just lies.
+
+    Way is path and turning together, `TURN_M_PER_RAD`. Where it is shorter than all pairs, there are fewer.
+
+    Args:
+        record: the trajectory.
+        numbers: frames to choose from, ascending.
+    """
+    if len(numbers) < 2:
+        return []
+    way_m = _way_m(record)[np.asarray(numbers)]
+    length_m = way_m[-1] - way_m[0]
+    count = min(MAX_PAIRS, max(1, int(length_m / SPACING_M)))
+    starts_m = way_m[0] + np.linspace(0, max(0.0, length_m - SPACING_M), count)
+    first = np.searchsorted(way_m, starts_m + _ROUNDING_M, side="right") - 1
+    second = np.searchsorted(way_m, starts_m + SPACING_M - _ROUNDING_M)
+    pairs = {
+        (numbers[a], numbers[min(b, len(numbers) - 1)]) for a, b in zip(first.tolist(), second.tolist(), strict=True)
+    }
+    return sorted((a, b) for a, b in pairs if a != b)
+
+
+def _way_m(record: EpisodeRecord) -> Float64Array:
+    """Way from the first frame to every frame, m; float64 [T]."""
+    poses = record.T_world_camera
+    steps_m = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1)
+    turns_rad = rotation_angle_rad((invert(poses[:-1]) @ poses[1:])[:, :3, :3])
+    way_m: Float64Array = np.concatenate([[0.0], np.cumsum(steps_m + TURN_M_PER_RAD * turns_rad)])
+    return way_m
+
+
+def _depth_m(record: EpisodeRecord, number: int, data: bytes, dataset: DatasetManifest) -> Float32Array:
+    return depth_m_from_raw(decode_depth(data, f"{record.id.text}, depth frame {number}"), dataset.depth)

@@ -1,0 +1,137 @@
+"""How the clips of a step lie in its batch: rows, first latents, lengths, and everything that follows from them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+
+from wsm_data.loaders.batches.batch import LATENT_TENSORS, NO_SEQUENCE, POSE_SLOTS, BatchLayout, layout_of
+from wsm_data.loaders.order.epoch_plan import EpochPlan
+from wsm_data.loaders.reading.clip_places import ClipPlace
+from wsm_data.loaders.reading.clip_reads import POSE_BYTES
+
+ANCHOR_SLOTS = POSE_SLOTS - 1
+"""Slots of latent 0 that repeat the first pose: raw frame f of a clip lies in its slot `ANCHOR_SLOTS` + f."""
+
+_READ_TENSORS = ("rgb", "depth", "depth_valid", "poses")
+_IDENTITY = np.array([0, 0, 0, 1, 0, 0, 0], np.float32)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class ArrangedClip:
+    """A sequence of a batch.
+
+    Attributes:
+        place: where its clip is read.
+        row: its row.
+        start: its first latent in the row.
+        latents: latents that are taken: the clip, or a prefix of it.
+    """
+
+    place: ClipPlace
+    row: int
+    start: int
+    latents: int
+
+
+def arrange(rows: Sequence[np.ndarray], places: Sequence[ClipPlace], plan: EpochPlan) -> list[ArrangedClip]:
+    """Lay the clips of each row one behind the other.
+
+    Args:
+        rows: refs in each row; int64 [clips of the row].
+        places: places of the clips of all rows.
+        plan: says how many latents are taken of each clip.
+    """
+    clips: list[ArrangedClip] = []
+    for row, refs in enumerate(rows):
+        start = 0
+        for latents in plan.sequence_latents[refs].tolist():
+            clips.append(ArrangedClip(place=places[len(clips)], row=row, start=start, latents=latents))
+            start += latents
+    return clips
+
+
+def batch_layout(
+    clips: Sequence[ArrangedClip], rows: int, plan: EpochPlan, latent_shape: tuple[int, int, int], dtype: torch.dtype
+) -> BatchLayout:
+    """The sizes of a batch: rows as long as the longest one, or of `row_latents` where they are packed; never empty."""
+    longest = max((clip.start + clip.latents for clip in clips), default=1)
+    return layout_of(rows, plan.order.row_latents or longest, len(clips), latent_shape, dtype)
+
+
+def slots_of(layout: BatchLayout, memory: memoryview, clip: ArrangedClip) -> dict[str, memoryview]:
+    """Memory of a clip in each tensor that is read from its shard.
+
+    Args:
+        layout: of the batch.
+        memory: block of the batch, as bytes.
+        clip: the clip.
+
+    Returns:
+        By name of the tensor, the bytes from the clip's first latent to its last; for `poses`, from raw frame 0 on.
+    """
+    slots = {name: memory[_stretch(layout, name, clip.row, clip.start, clip.latents)] for name in _READ_TENSORS}
+    slots["poses"] = slots["poses"][ANCHOR_SLOTS * POSE_BYTES :]
+    return slots
+
+
+def describe(
+    layout: BatchLayout,
+    memory: memoryview,
+    clips: Sequence[ArrangedClip],
+    *,
+    refs: np.ndarray,
+    chunk_size: np.ndarray,
+    goals: Sequence[np.ndarray],
+) -> None:
+    """Fill in everything but what was read: masks, lengths, goals, anchors, and zeros where there is no clip.
+
+    Args:
+        layout: of the batch.
+        memory: block of the batch, as bytes.
+        clips: the clips of the batch.
+        refs: their refs; int64 [N].
+        chunk_size: chunk size of each; int64 [N].
+        goals: last camera position of each, m; N of float32 [3].
+    """
+    arrays = {name: _array(layout, memory, name) for name in layout.tensors if name not in LATENT_TENSORS}
+    by_slot = (layout.rows, POSE_SLOTS * layout.row_latents)
+    still, poses = arrays["still"].reshape(by_slot), arrays["poses"].reshape(*by_slot, 7)
+    still[:], arrays["sequence_id"][:], arrays["latent_index"][:] = False, NO_SEQUENCE, 0
+    used = [0] * layout.rows
+    for number, clip in enumerate(clips):
+        end = used[clip.row] = clip.start + clip.latents
+        arrays["sequence_id"][clip.row, clip.start : end] = number
+        arrays["latent_index"][clip.row, clip.start : end] = np.arange(clip.latents)
+        frame_0 = POSE_SLOTS * clip.start + ANCHOR_SLOTS
+        poses[clip.row, frame_0 - ANCHOR_SLOTS : frame_0] = _IDENTITY
+        real_frames = clip.place.frames - clip.place.padded_frames
+        still[clip.row, frame_0 + real_frames : POSE_SLOTS * end] = True
+    for row, end in enumerate(used):
+        _clear(layout, memory, row, end)
+    arrays["row"][:] = [clip.row for clip in clips]
+    arrays["start"][:] = [clip.start for clip in clips]
+    arrays["lengths"][:] = [clip.latents for clip in clips]
+    arrays["refs"][:], arrays["chunk_size"][:] = refs, chunk_size
+    for number, goal in enumerate(goals):
+        arrays["goal_camera0_m"][number] = goal
+
+
+def _clear(layout: BatchLayout, memory: memoryview, row: int, end: int) -> None:
+    """Zeros behind the last sequence of a row."""
+    unused = layout.row_latents - end
+    for name in _READ_TENSORS if unused else ():
+        np.frombuffer(memory[_stretch(layout, name, row, end, unused)], np.uint8)[:] = 0
+
+
+def _stretch(layout: BatchLayout, name: str, row: int, start: int, latents: int) -> slice:
+    """Bytes of some latents of a row in a tensor."""
+    offset, of_row, of_latent = layout.strides_bytes[name]
+    first = offset + row * of_row + start * of_latent
+    return slice(first, first + latents * of_latent)
+
+
+def _array(layout: BatchLayout, memory: memoryview, name: str) -> np.ndarray:
+    place = layout.tensors[name]
+    return np.ndarray(place.shape, str(place.dtype).removeprefix("torch."), memory, place.offset)

@@ -1,0 +1,102 @@
+"""Where clips stand in their shards, as far as batches need it: columns of the index, looked up for a batch at once."""
+
+from dataclasses import dataclass
+from operator import add, sub
+
+import numpy as np
+
+from wsm_data.access.shard_reader import Span
+from wsm_data.loaders.sources.clips import Sources
+from wsm_data.schema.clip import TEMPORAL_RATIO
+
+READ_MEMBERS = ("rgb_latent", "depth_latent", "depth_valid", "poses")
+"""Members that batches are made of, in stored order."""
+
+_EACH = len(READ_MEMBERS)
+_COLUMNS = (
+    *("key", "shard", "latents", "padded_frames", "clip_offset"),
+    *(f"{name}_{what}" for what in ("offset", "size", "checksum") for name in READ_MEMBERS),
+)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class ClipPlace:
+    """Where a clip stands, as far as batches need it.
+
+    Attributes:
+        source: number of the source.
+        number: number of the clip in the source's table.
+        key: key of the clip.
+        shard: file name of its shard.
+        latents: F, latent frames of the whole clip.
+        padded_frames: still frames at its end.
+        clip_offset: first byte of the clip in the shard.
+        offsets: first byte of each of `READ_MEMBERS` in the shard.
+        sizes: bytes of each.
+        checksums: xxh3_64 of each.
+    """
+
+    source: int
+    number: int
+    key: str
+    shard: str
+    latents: int
+    padded_frames: int
+    clip_offset: int
+    offsets: tuple[int, ...]
+    sizes: tuple[int, ...]
+    checksums: tuple[int, ...]
+
+    @property
+    def frames(self) -> int:
+        """T, raw frames of the whole clip."""
+        return frames_of(self.latents)
+
+    @property
+    def where(self) -> str:
+        """Shard and clip, for messages."""
+        return f"{self.shard}, clip {self.key}"
+
+    @property
+    def gaps(self) -> tuple[int, ...]:
+        """Bytes in front of each member: padding of the one before, and headers."""
+        ends = (self.clip_offset, *map(add, self.offsets, self.sizes))
+        return tuple(map(sub, self.offsets, ends))
+
+
+def frames_of(latents: int) -> int:
+    """Raw frames of so many latents."""
+    return 1 + TEMPORAL_RATIO * (latents - 1)
+
+
+def clip_places(sources: Sources, refs: np.ndarray) -> list[ClipPlace]:
+    """Places of clips, in the order of their refs; int64 [N]."""
+    places: list[ClipPlace | None] = [None] * len(refs)
+    for source, table in enumerate(sources.tables):
+        own = np.flatnonzero((refs >= table.base) & (refs < table.base + len(table)))
+        numbers = refs[own] - table.base
+        if not len(own):
+            continue
+        columns = [values.tolist() for values in table.values(_COLUMNS, numbers)]
+        single, members = columns[: -3 * _EACH], columns[-3 * _EACH :]
+        of_members = [zip(*members[first : first + _EACH], strict=True) for first in range(0, 3 * _EACH, _EACH)]
+        found = zip(own.tolist(), numbers.tolist(), *single, *of_members, strict=True)
+        for place, number, key, shard, latents, padded_frames, clip_offset, offsets, sizes, checksums in found:
+            places[place] = ClipPlace(
+                source=source,
+                number=number,
+                key=key,
+                shard=shard,
+                latents=latents,
+                padded_frames=padded_frames,
+                clip_offset=clip_offset,
+                offsets=offsets,
+                sizes=sizes,
+                checksums=checksums,
+            )
+    return [place for place in places if place is not None]
+
+
+def span_of(place: ClipPlace) -> Span:
+    """The stretch of the shard from the first to the last byte that a batch may need of a clip."""
+    return Span(place.shard, place.clip_offset, place.offsets[-1] + place.sizes[-1] - place.clip_offset)

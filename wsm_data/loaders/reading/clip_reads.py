@@ -1,0 +1,175 @@
+"""One clip from its shard into memory that the caller owns: which bytes go where, and whether they are the right ones.
+
+The members that a batch needs stand one after the other in the shard, with their headers between them. One scattered
+read puts each of them where it belongs; what lies between goes into memory that nobody looks at.
+"""
+
+from collections.abc import Iterator, Sequence
+from functools import lru_cache
+from math import prod
+from operator import add, itemgetter
+
+import numpy as np
+import xxhash
+
+from wsm_data.access.shard_reader import ShardReader
+from wsm_data.errors import IntegrityError
+from wsm_data.loaders.reading.clip_places import READ_MEMBERS, ClipPlace, frames_of
+from wsm_data.loaders.timing import Part, Stopwatch
+from wsm_data.shards.members import STORED_DTYPES, array_header, shape_of
+from wsm_data.shards.names import INDEX_NAME
+from wsm_data.shards.tar_format import NPY_HEADER_BYTES, padded
+
+POSE_BYTES = 7 * STORED_DTYPES["poses"].itemsize
+MAX_GAP_BYTES = 1 << 16
+"""What lies between two wanted stretches is read along with them up to this size; a second read costs about as much."""
+
+MAX_READS = 3
+"""How often a clip is read whose bytes a store, or a cache, may have damaged on the way."""
+
+_UNWANTED = memoryview(bytearray(MAX_GAP_BYTES))
+_NOTHING = memoryview(b"")
+
+
+def read_clip(
+    reader: ShardReader,
+    place: ClipPlace,
+    latent_shape: tuple[int, int, int],
+    slots: Sequence[memoryview],
+    *,
+    checked: bool,
+    watch: Stopwatch,
+) -> np.ndarray:
+    """Read a clip, or a prefix of it, into slots.
+
+    Args:
+        reader: of the release's shards.
+        place: the clip.
+        latent_shape: channels, height and width of a latent.
+        slots: memory for the leading bytes of each of `READ_MEMBERS`, all of them or fewer.
+        checked: compare headers and checksums; for this, members are read to their end.
+        watch: measures the time of reading and of checking.
+
+    Returns:
+        The last pose of the whole clip; float32 [7].
+
+    Raises:
+        IntegrityError: the shard is missing or ends too early, its bytes are not those that the index vouches for, or
+            the index places members where they cannot be; names shard and clip.
+    """
+    shapes, sizes = _shapes_and_sizes(place.latents, latent_shape)
+    _require_sound(place, sizes)
+    if checked:
+        tails = _read_checked(reader, place, shapes, slots, watch)
+    else:
+        tails = _last_pose(place, slots)
+        with watch.measure(Part.STORE):
+            _fill(reader, place, _pieces(place, (), slots, tails))
+    return np.frombuffer((tails[-1] if tails[-1].nbytes else slots[-1])[-POSE_BYTES:], STORED_DTYPES["poses"])
+
+
+def _read_checked(
+    reader: ShardReader,
+    place: ClipPlace,
+    shapes: Sequence[tuple[int, ...]],
+    slots: Sequence[memoryview],
+    watch: Stopwatch,
+) -> list[memoryview]:
+    """Read members to their end, with their headers, and compare both; returns what lies behind each slot."""
+    headers = [memoryview(bytearray(size)) for size in place.gaps]
+    tails = [memoryview(bytearray(size - slot.nbytes)) for size, slot in zip(place.sizes, slots, strict=True)]
+    for reads in range(1, MAX_READS + 1):
+        with watch.measure(Part.STORE):
+            _fill(reader, place, _pieces(place, headers, slots, tails))
+        with watch.measure(Part.CHECKSUM):
+            damage = next(_damage(place, shapes, headers, slots, tails), None)
+        if damage is None:
+            break
+        if not reader.forget(place.shard) or reads == MAX_READS:
+            raise IntegrityError(f"{place.where}: {damage}; fetch the shard again, or run `wsm verify` for the extent")
+    return tails
+
+
+def _last_pose(place: ClipPlace, slots: Sequence[memoryview]) -> list[memoryview]:
+    """Memory for the one thing that is needed behind a prefix: the pose at the end of the clip."""
+    size = min(place.sizes[-1] - slots[-1].nbytes, POSE_BYTES)
+    return [_NOTHING, _NOTHING, _NOTHING, memoryview(bytearray(size))]
+
+
+@lru_cache(maxsize=4096)
+def _shapes_and_sizes(
+    latents: int, latent_shape: tuple[int, int, int]
+) -> tuple[tuple[tuple[int, ...], ...], tuple[int, ...]]:
+    """Shape, and bytes, of each member that is read of a clip of so many latents."""
+    axes = dict(zip("FChwT", (latents, *latent_shape, frames_of(latents)), strict=True))
+    shapes = tuple(shape_of(name, axes) for name in READ_MEMBERS)
+    sizes = (prod(shape) * STORED_DTYPES[name].itemsize for name, shape in zip(READ_MEMBERS, shapes, strict=True))
+    return shapes, tuple(sizes)
+
+
+def _pieces(
+    place: ClipPlace, headers: Sequence[memoryview], slots: Sequence[memoryview], tails: Sequence[memoryview]
+) -> list[tuple[int, memoryview]]:
+    """What is read: offset in the shard and memory for it, in the order of the offsets."""
+    pieces = list(zip(place.offsets, slots, strict=True))
+    pieces += [(offset - header.nbytes, header) for offset, header in zip(place.offsets, headers, strict=False)]
+    ends = map(add, place.offsets, place.sizes)
+    pieces += [(end - tail.nbytes, tail) for end, tail in zip(ends, tails, strict=True) if tail.nbytes]
+    return sorted(pieces, key=itemgetter(0))
+
+
+def _fill(reader: ShardReader, place: ClipPlace, pieces: Sequence[tuple[int, memoryview]]) -> None:
+    """Read pieces that stand close together at once, with what lies between them."""
+    start = end = place.clip_offset
+    buffers: list[memoryview] = []
+    try:
+        for offset, buffer in pieces:
+            if offset - end > MAX_GAP_BYTES and buffers:
+                reader.read_into(place.shard, start, buffers)
+                buffers = []
+            if not buffers:
+                start = end = offset
+            elif offset > end:
+                buffers.append(_UNWANTED[: offset - end])
+            buffers.append(buffer)
+            end = offset + buffer.nbytes
+        reader.read_into(place.shard, start, buffers)
+    except IntegrityError as error:
+        raise IntegrityError(f"clip {place.key}: {error}") from error
+
+
+def _damage(
+    place: ClipPlace,
+    shapes: Sequence[tuple[int, ...]],
+    headers: Sequence[memoryview],
+    slots: Sequence[memoryview],
+    tails: Sequence[memoryview],
+) -> Iterator[str]:
+    """What is wrong with the bytes that were read, member by member."""
+    before = 0  # bytes of the member before, in whole blocks and in part
+    for name, header, shape, size in zip(READ_MEMBERS, headers, shapes, place.sizes, strict=True):
+        if header != bytes(padded(before) - before) + array_header(place.key, name, shape):
+            yield f"the header of {name}.npy, or the padding before it, is not that of this clip"
+        before = NPY_HEADER_BYTES + size
+    for name, wanted, slot, tail in zip(READ_MEMBERS, place.checksums, slots, tails, strict=True):
+        found = _checksum(slot, tail)
+        if found != wanted:
+            yield f"the checksum of {name}.npy must be {wanted:016x}, found {found:016x}"
+
+
+def _checksum(slot: memoryview, tail: memoryview) -> int:
+    if not tail.nbytes:
+        return xxhash.xxh3_64_intdigest(slot)
+    state = xxhash.xxh3_64(slot)
+    state.update(tail)
+    return state.intdigest()
+
+
+def _require_sound(place: ClipPlace, sizes: tuple[int, ...]) -> None:
+    """The index must give the members the sizes of a clip, one behind the other, with room for headers between them."""
+    gaps = place.gaps
+    if place.sizes != sizes or min(gaps) <= 0 or max(gaps) > MAX_GAP_BYTES:
+        raise IntegrityError(
+            f"{place.where}: {INDEX_NAME} places members where a clip of {place.latents} latents does not have them, "
+            f"at {place.offsets} with {place.sizes} bytes; restore the index"
+        )

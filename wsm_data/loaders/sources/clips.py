@@ -1,0 +1,313 @@
+"""The clips that a loader draws from: releases opened, split and selection applied, and every clip with a number.
+
+The number of a clip over all sources, its *ref*, is the base of its source plus its number in the source's table, which
+has the clips in the order of the index.
+"""
+
+import logging
+from bisect import bisect_right
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import chain
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+
+from wsm_data.access.release import Release, open_release
+from wsm_data.errors import ConfigError
+from wsm_data.files.digest import sha256_bytes
+from wsm_data.loaders.config import OrderConfig, SourceConfig
+from wsm_data.loaders.order.epoch_plan import EpochPlan, plan_epoch
+from wsm_data.loaders.order.pass_order import SourceLayout
+from wsm_data.loaders.order.stable_hash import Int64Array
+from wsm_data.shards.index_row import IndexRow
+from wsm_data.shards.selection import read_selection
+
+_LOG = logging.getLogger(__name__)
+
+_COMPARED_AT_ONCE = 1 << 20
+"""Clips of two sources whose texts are held at the same time, to be compared."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SourceTable:
+    """The clips of one source, in the order of the index. Columns are read when they are first asked for.
+
+    Attributes:
+        config: what was asked for.
+        release: the release; its index is read column by column.
+        selection: name of the selection, empty for none.
+        rows: rows of the index that the source has, ascending, one more than once where a clip is to be read for
+            several purposes; int64 [clips].
+        base: ref of its first clip.
+    """
+
+    config: SourceConfig
+    release: Release
+    selection: str
+    rows: Int64Array
+    base: int
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    @cached_property
+    def shards(self) -> tuple[str, ...]:
+        """File names of the shards of the release."""
+        return self._shard_column[1]
+
+    @cached_property
+    def shard_codes(self) -> np.ndarray:
+        """Shard of each clip, as a number into `shards`; int32 [clips]."""
+        return self._of_source(self._shard_column[0])
+
+    @cached_property
+    def layout(self) -> SourceLayout:
+        """What the order of the source depends on."""
+        codes = self.shard_codes
+        starts = np.flatnonzero(np.concatenate([[True], codes[1:] != codes[:-1]])) if len(codes) else codes
+        shard_clips = np.diff(np.append(starts, len(codes))).astype(np.int64)
+        return SourceLayout(shard_clips=shard_clips, latents=self.column("latents"), weight=self.config.weight)
+
+    def column(self, name: str) -> np.ndarray:
+        """An integer column of the index for the clips of the source, such as `rgb_latent_offset`; [clips]. Kept."""
+        if name not in self._columns:
+            self._columns[name] = self._of_source(self.release.index.numbers(name))
+        return self._columns[name]
+
+    def values(self, names: Sequence[str], numbers: Int64Array) -> list[np.ndarray]:
+        """Some columns of the index for some clips, by their numbers in the table; texts as arrays of objects.
+
+        Unlike `column` it holds little: what a batch needs of an index of any size.
+        """
+        return self.release.index.values(names, self.rows[np.asarray(numbers, np.int64)])
+
+    def keys(self, numbers: Sequence[int] | Int64Array) -> list[str]:
+        """Keys of some clips, by their numbers in the table."""
+        [keys] = self.values(["key"], np.asarray(numbers, np.int64))
+        return list(keys)
+
+    def index_row(self, number: int) -> IndexRow:
+        """Everything the index says of a clip, by its number in the table.
+
+        Raises:
+            IntegrityError: the row contradicts itself.
+        """
+        return self.release.index.row_at(int(self.rows[number]))
+
+    @cached_property
+    def _columns(self) -> dict[str, np.ndarray]:
+        return {}
+
+    @cached_property
+    def _shard_column(self) -> tuple[np.ndarray, tuple[str, ...]]:
+        return self.release.index.codes("shard")
+
+    @cached_property
+    def _has_all_rows(self) -> bool:
+        return len(self.rows) == len(self.release.index) and bool((np.diff(self.rows) == 1).all())
+
+    def _of_source(self, column: np.ndarray) -> np.ndarray:
+        return column if self._has_all_rows else column[self.rows]
+
+
+@dataclass(frozen=True, eq=False)
+class Sources:
+    """All sources of a loader.
+
+    Attributes:
+        tables: the sources, in the order of the settings.
+        duplicates: clips that are reached through more than one source.
+    """
+
+    tables: tuple[SourceTable, ...]
+    duplicates: int
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Cross to another process as settings: files stay here, and are opened again there."""
+        return open_sources, ([table.config for table in self.tables],)
+
+    @property
+    def clips(self) -> int:
+        """Clips of all sources; a ref is a number below it."""
+        return self.tables[-1].base + len(self.tables[-1])
+
+    @cached_property
+    def layouts(self) -> tuple[SourceLayout, ...]:
+        """What the order depends on."""
+        return tuple(table.layout for table in self.tables)
+
+    def plan(self, order: OrderConfig, epoch: int) -> EpochPlan:
+        """Plan an epoch.
+
+        Raises:
+            ConfigError: a clip does not fit into a packed row, or the epoch has no step.
+        """
+        return plan_epoch(self.layouts, order, epoch)
+
+    def locate(self, ref: int) -> tuple[SourceTable, int]:
+        """The source of a clip, and the number of the clip in the source's table.
+
+        Raises:
+            ValueError: there is no such ref.
+        """
+        if not 0 <= ref < self.clips:
+            raise ValueError(f"a ref must be at least 0 and below {self.clips}, found {ref}")
+        table = self.tables[bisect_right(self._bases, ref) - 1]
+        return table, int(ref) - table.base
+
+    def keys(self, refs: Sequence[int] | Int64Array) -> list[str]:
+        """Keys of clips, in the order of the refs."""
+        wanted = np.asarray(refs, np.int64)
+        keys = np.empty(len(wanted), object)
+        owners = np.searchsorted(self._bases, wanted, side="right") - 1
+        for number in np.unique(owners):
+            table, own = self.tables[number], owners == number
+            keys[own] = table.keys(wanted[own] - table.base)
+        return list(keys)
+
+    def identity(self) -> list[dict[str, Any]]:
+        """What the order is drawn over, as JSON: for each source the release by name and digest, never by its place."""
+        return [_identity(table) for table in self.tables]
+
+    @cached_property
+    def _bases(self) -> list[int]:
+        return [table.base for table in self.tables]
+
+
+def open_sources(configs: Sequence[SourceConfig]) -> Sources:
+    """Open the releases of all sources; a release of several sources is opened once.
+
+    Raises:
+        ConfigError: there is no such release, split or selection, the selection is of another release, a source has
+            no clip, or the sources were made with different codecs or image sizes.
+        IntegrityError: a release is unfinished or damaged.
+    """
+    if not configs:
+        raise ConfigError("a loader must have at least one source, found none; name a release in sources")
+    releases: dict[str, Release] = {}
+    tables: list[SourceTable] = []
+    for config in configs:
+        if config.release not in releases:
+            releases[config.release] = open_release(config.release)
+        base = tables[-1].base + len(tables[-1]) if tables else 0
+        tables.append(_open_source(config, releases[config.release], base))
+        _require_alike(tables[0].release, tables[-1].release)
+    return Sources(tuple(tables), count_duplicates(tables))
+
+
+def _open_source(config: SourceConfig, release: Release, base: int) -> SourceTable:
+    is_chosen = _is_of_split(config, release)
+    rows, selection = np.flatnonzero(is_chosen), ""
+    if config.selection:
+        chosen = read_selection(release.store, config.selection, release.digest, release.index)
+        rows, selection = chosen.rows_of(release.index), chosen.name
+        rows = rows[is_chosen[rows]]
+    if not len(rows):
+        wanted = f"split {config.split or 'any'}" + (f" and selection {selection}" if selection else "")
+        raise ConfigError(f"a source must have clips, but {config.release} has none of {wanted}")
+    return SourceTable(config=config, release=release, selection=selection, rows=rows, base=base)
+
+
+def _is_of_split(config: SourceConfig, release: Release) -> np.ndarray:
+    """For each row of the index, whether it is of the split of the source; bool [rows]."""
+    if not config.split:
+        return np.ones(len(release.index), np.bool_)
+    codes, splits = release.index.codes("split")
+    if config.split not in splits:
+        raise ConfigError(
+            f"{release.store.root} must have clips of split {config.split!r}, found {', '.join(splits) or 'none'}; "
+            "set split to one of them, or to '' for all"
+        )
+    return codes == splits.index(config.split)
+
+
+def _require_alike(first: Release, other: Release) -> None:
+    """Latents of one batch must mean the same and have the same shape."""
+    first.require_codec(other.manifest.codec)
+    sizes = [(release.manifest.encoded_width_px, release.manifest.encoded_height_px) for release in (first, other)]
+    if sizes[0] != sizes[1]:
+        raise ConfigError(
+            f"the sources of a loader must have images of one size: {first.store.root} has {sizes[0]}, "
+            f"{other.store.root} has {sizes[1]} (width and height, px); load them apart, or encode one again"
+        )
+
+
+def count_duplicates(tables: Sequence[SourceTable]) -> int:
+    """Count the clips that an earlier source has too, by key and digest of their content, and log what was found."""
+    total = 0
+    for number, table in enumerate(tables):
+        for earlier in tables[:number]:
+            count, key = _shared(earlier, table)
+            total += count
+            if count:
+                _LOG.warning(
+                    "%d clips, such as %s, come from source %s and from source %s; an epoch brings them once for each",
+                    count, key, _words(earlier), _words(table),
+                )  # fmt: skip
+    return total
+
+
+def _shared(one: SourceTable, other: SourceTable) -> tuple[int, str]:
+    """How many clips two sources share, and the key of the first in the order of `one`.
+
+    Hashes are compared first, so that of sources of any size only the texts of some clips are held.
+    """
+    if one.release.digest == other.release.digest:
+        rows = np.intersect1d(one.rows, other.rows, assume_unique=True)
+        return len(rows), one.release.index.values(["key"], rows[:1])[0][0] if len(rows) else ""
+    hashes, others = _content_hashes(one), _content_hashes(other)
+    common = np.intersect1d(hashes, others)
+    count, first = 0, len(one)
+    for start in range(0, len(common), _COMPARED_AT_ONCE):
+        wanted = common[start : start + _COMPARED_AT_ONCE]
+        known = set(_contents(other, _numbers_of(others, wanted)))
+        numbers = _numbers_of(hashes, wanted)
+        shared = [n for n, content in zip(numbers.tolist(), _contents(one, numbers), strict=True) if content in known]
+        count, first = count + len(shared), min([first, *shared[:1]])
+    return count, one.keys([first])[0] if count else ""
+
+
+def _content_hashes(table: SourceTable) -> Int64Array:
+    """A number for each clip, the same for the same content within this process; int64 [clips]."""
+    parts = (zip(*(column.to_pylist() for column in part), strict=True) for part in _content_parts(table))
+    return np.fromiter(map(hash, chain.from_iterable(parts)), np.int64, len(table.release.index))[table.rows]
+
+
+def _numbers_of(hashes: Int64Array, wanted: Int64Array) -> Int64Array:
+    """Numbers of the clips, ascending, whose hash is one of `wanted`, which are ascending too."""
+    near = np.flatnonzero((hashes >= wanted[0]) & (hashes <= wanted[-1]))
+    return near[np.isin(hashes[near], wanted)]
+
+
+def _contents(table: SourceTable, numbers: Int64Array) -> Iterator[tuple[str, str]]:
+    """Key and digest of the content of some clips, ascending by number; the index is read part by part."""
+    rows, start = table.rows[numbers], 0
+    for keys, digests in _content_parts(table):
+        first, last = np.searchsorted(rows, (start, start + len(keys)))
+        own = rows[first:last] - start
+        yield from zip(keys.take(own).to_pylist(), digests.take(own).to_pylist(), strict=True)
+        start += len(keys)
+
+
+def _content_parts(table: SourceTable) -> Iterator[tuple[pa.ChunkedArray, pa.ChunkedArray]]:
+    return zip(table.release.index.parts("key"), table.release.index.parts("source_digest"), strict=True)
+
+
+def _words(table: SourceTable) -> str:
+    parts = (table.config.release, table.config.split, table.selection)
+    return " / ".join(part for part in parts if part)
+
+
+def _identity(table: SourceTable) -> dict[str, Any]:
+    return {
+        "release": table.release.manifest.name,
+        "release_digest": table.release.digest,
+        "split": table.config.split,
+        "selection": table.selection,
+        "clips": len(table),
+        "selection_sha256": sha256_bytes(table.rows.astype("<i8").tobytes()) if table.selection else "",
+        "weight": table.config.weight,
+    }
