@@ -55,7 +55,7 @@ def encode_without_codec(
 def make_sources(folder: Path) -> tuple[dict[str, Path], list[tuple[Path, Path]]]:
     """The same scenes in two layouts, and the pairs of colour and depth files."""
     from wsm_data.synth.config import SynthConfig  # here: every worker imports this file, and needs no renderer
-    from wsm_data.synth.writers import write_scene
+    from wsm_data.synth.writers.scenes import write_scene
 
     sources = {}
     for layout in LAYOUTS:

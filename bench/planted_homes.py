@@ -23,12 +23,12 @@ from wsm_data.schema.episode import EpisodeRecord
 from wsm_data.schema.identity import EpisodeId
 from wsm_data.schema.surface import CELL_SIZE_M, SurfaceVoxels
 from wsm_data.synth.config import CAMERAS
-from wsm_data.synth.expert import smooth_way
-from wsm_data.synth.furnishing import furnish_room
-from wsm_data.synth.occupancy import Clearance
-from wsm_data.synth.plan import PARTITION_M, FloorPlan, Opening, Room, make_plan, side_of
-from wsm_data.synth.planner import cell_graph, way_to, ways_from
-from wsm_data.synth.style import choose_style
+from wsm_data.synth.drive.expert import smooth_way
+from wsm_data.synth.drive.occupancy import Clearance
+from wsm_data.synth.drive.route_graph import cell_graph, way_to, ways_from
+from wsm_data.synth.home.floor_plan import PARTITION_M, FloorPlan, Opening, Room, make_floor_plan, side_of
+from wsm_data.synth.home.furnishing import furnish_room
+from wsm_data.synth.home.style import choose_style
 
 DATASET = load_dataset("synthetic")
 CLEAR_M = 0.6  # furniture keeps this far from the straight way of the easy twin
@@ -67,7 +67,7 @@ def planted_pair(kind: str, case: int, seed: int) -> tuple[Twin, Twin]:
     """The easy and the hard twin of a case; homes are drawn until the difficulty finds a place in one."""
     for attempt in range(TRIES):
         rng = np.random.default_rng([seed, list(KINDS).index(kind), case, attempt])
-        plan = make_plan(rng)
+        plan = make_floor_plan(rng)
         settings = KINDS[kind](rng, plan, furniture_of(rng, plan))
         trajectories = [drive(one) for one in settings] if settings else [None]
         if all(one is not None for one in trajectories):

@@ -15,10 +15,10 @@ from reporting import machine, machine_line, table, write_results
 from wsm_data.geometry.camera import pixel_rays
 from wsm_data.schema.camera import Intrinsics
 from wsm_data.synth.config import CAMERAS, SynthConfig
-from wsm_data.synth.expert import plan_episode
-from wsm_data.synth.home import Home, home_trimesh, make_home
-from wsm_data.synth.occupancy import scene_columns
-from wsm_data.synth.render import make_buffers, render
+from wsm_data.synth.drive.expert import plan_episode
+from wsm_data.synth.drive.occupancy import scene_columns
+from wsm_data.synth.home.home import Home, home_trimesh, make_home
+from wsm_data.synth.render.render import make_buffers, render
 
 ROUNDS = 7
 FRAMES = 48

@@ -17,7 +17,7 @@ from typer.core import TyperGroup
 from pipelines.recipe import recipe_summaries
 from pipelines.registry import STAGES, StageEntry
 from pipelines.running.engines.choice import EngineName
-from wsm_data.curation.audit_finding import Severity
+from wsm_data.curation.audit.finding import Severity
 from wsm_data.curation.split import SplitBy
 from wsm_data.errors import ConfigError, WsmError
 

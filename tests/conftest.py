@@ -13,7 +13,7 @@ from pipelines.registry import load_stage
 from pipelines.running.runner import RunOptions, run_stage
 from pipelines.running.stage_report import StageReport
 from wsm_data.synth.config import SynthConfig
-from wsm_data.synth.writers import write_scene
+from wsm_data.synth.writers.scenes import write_scene
 
 settings.register_profile("wsm", deadline=None, derandomize=True)  # a busy machine breaks no time limit
 settings.load_profile("wsm")

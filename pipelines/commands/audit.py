@@ -7,13 +7,13 @@ import typer
 from tqdm import tqdm
 
 from wsm_data.access.release import Release, open_release
-from wsm_data.curation.audit import AuditConfig, audit_release, count_findings
-from wsm_data.curation.audit_finding import AuditFinding, Severity
+from wsm_data.curation.audit.finding import AuditFinding, Severity
+from wsm_data.curation.audit.guards import AuditConfig, audit_release, count_findings
 from wsm_data.curation.diversity import DiversityConfig
 from wsm_data.curation.split import SplitBy
 from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.shards.manifest import release_digest
-from wsm_data.view.text_table import aligned
+from wsm_data.view.drawing.text_table import aligned
 
 _SHOWN_FINDINGS = 3
 

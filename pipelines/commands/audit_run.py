@@ -10,7 +10,7 @@ from wsm_data.loaders.ledger.audit import EpochAudit, audit_epochs, sightings
 from wsm_data.loaders.ledger.sources import open_recorded_sources, recorded_order, refs_of_key
 from wsm_data.loaders.ledger.timeline import Timeline, read_timeline, steps_text
 from wsm_data.loaders.sources.clips import Sources
-from wsm_data.view.text_table import aligned
+from wsm_data.view.drawing.text_table import aligned
 
 
 def audit_run(

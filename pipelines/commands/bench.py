@@ -11,7 +11,7 @@ from wsm_data.loaders.config import LoaderConfig, OrderConfig, ReadConfig, Sourc
 from wsm_data.loaders.doctor.diagnosis import LoaderRun, cautions, diagnose, readers
 from wsm_data.loaders.doctor.examine import examine
 from wsm_data.loaders.timing import Part
-from wsm_data.view.text_table import aligned
+from wsm_data.view.drawing.text_table import aligned
 
 SWEPT_THREADS = (1, 2, 4)
 _PARTS = {

@@ -8,10 +8,10 @@ from wsm_data.access.release import Release, open_release
 from wsm_data.errors import ConfigError
 from wsm_data.schema.identity import EpisodeId
 from wsm_data.shards.release_codec import codec_of
-from wsm_data.view.clip_text import describe_clip
-from wsm_data.view.contact_sheet import draw_contact_sheet
-from wsm_data.view.release_text import describe_release
-from wsm_data.view.rerun_export import write_rerun
+from wsm_data.view.clip.contact_sheet import draw_contact_sheet
+from wsm_data.view.clip.rerun_export import write_rerun
+from wsm_data.view.clip.text import describe_clip
+from wsm_data.view.release.text import describe_release
 
 
 def inspect_release(

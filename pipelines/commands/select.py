@@ -12,7 +12,7 @@ from pipelines.stages import materialise as copying
 from pipelines.stages import select, verify
 from wsm_data.access.release import open_release
 from wsm_data.shards.release_codec import codec_of
-from wsm_data.view.selection_report import write_selection_report
+from wsm_data.view.selection.report import write_selection_report
 
 
 def run_select(

@@ -14,9 +14,9 @@ from wsm_data.files.stores import open_store
 from wsm_data.files.typed_toml import INPUT
 from wsm_data.shards.manifest import release_digest
 from wsm_data.shards.release_codec import codec_of
-from wsm_data.view.clip_survey import SurveyConfig, survey_clips
-from wsm_data.view.report import write_report
-from wsm_data.view.report_data import ReportData, StageSummary
+from wsm_data.view.release.clip_survey import SurveyConfig, survey_clips
+from wsm_data.view.release.report import write_report
+from wsm_data.view.release.report_data import ReportData, StageSummary
 
 REPORT_FILE = "report.html"
 

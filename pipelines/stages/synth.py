@@ -6,8 +6,8 @@ from pipelines.running.settings import settings_of
 from pipelines.running.stage import Outcome, Stage, StageContext, Unit
 from wsm_data.files.digest import digest_json
 from wsm_data.synth.config import SynthConfig
-from wsm_data.synth.recording import plan_recording
-from wsm_data.synth.writers import write_home, write_recording
+from wsm_data.synth.writers.recording import plan_recording
+from wsm_data.synth.writers.scenes import write_home, write_recording
 
 TREE = "tree"
 """Folder of the generated source tree inside the stage's folder."""

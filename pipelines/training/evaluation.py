@@ -12,7 +12,7 @@ from pipelines.training.config import HeldOutConfig
 from wsm_data.files.atomic import write_text
 from wsm_data.loaders.batches.batch import Batch
 from wsm_data.loaders.loader import ClipLoader
-from wsm_data.view.text_table import aligned
+from wsm_data.view.drawing.text_table import aligned
 from wsm_model.config import Variant
 from wsm_model.evaluation.held_out import ClipErrors, FlowErrors, clip_errors, flow_matching_errors, mean_of
 from wsm_model.model import WorldSlamModel

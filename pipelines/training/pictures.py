@@ -13,9 +13,9 @@ from wsm_data.codecs.depth import depth_m_from_latent_video
 from wsm_data.files.jsonlines import read_lines
 from wsm_data.loaders.batches.batch import Batch
 from wsm_data.schema.depth import DepthRange
-from wsm_data.view.clip_pictures import spread_frames
-from wsm_data.view.dream_sheet import DreamSheet, draw_dream_sheet
-from wsm_data.view.training_curves import draw_training_curves
+from wsm_data.view.clip.pictures import spread_frames
+from wsm_data.view.training.curves import draw_training_curves
+from wsm_data.view.training.dream_sheet import DreamSheet, draw_dream_sheet
 from wsm_model.config import Variant
 from wsm_model.inference.passes import StateEstimate
 from wsm_model.inference.sampler import flow_schedule

@@ -23,7 +23,7 @@ from wsm_data.readers.frames import iter_episode_frames
 from wsm_data.readers.manifest import MANIFEST_FOLDER, load_dataset
 from wsm_data.readers.record_table import read_records
 from wsm_data.schema.depth import DepthRange
-from wsm_data.synth.home import make_home
+from wsm_data.synth.home.home import make_home
 
 FRAMES = (0, 7)
 POINTS_PER_FRAME = 120

@@ -15,10 +15,10 @@ import pytest
 import trimesh
 from PIL import Image
 
-from wsm_data.synth import recording
 from wsm_data.synth.config import SynthConfig
-from wsm_data.synth.home import make_home
-from wsm_data.synth.writers import write_scene
+from wsm_data.synth.home.home import make_home
+from wsm_data.synth.writers import recording
+from wsm_data.synth.writers.scenes import write_scene
 
 SMALL = SynthConfig(
     scenes=1, trajectories=2, image_scale=0.5, min_frames=12, max_frames=40, min_step_m=0.08, max_step_m=0.3

@@ -4,8 +4,8 @@ import pytest
 
 from wsm_data.readers.manifest import load_dataset
 from wsm_data.schema.dataset import CameraModel
-from wsm_data.synth.cloud import OBSTACLE_RGB, PATH_RGB
 from wsm_data.synth.config import CAMERAS, SynthConfig
+from wsm_data.synth.writers.cloud import OBSTACLE_RGB, PATH_RGB
 
 DATASET, CONFIG = load_dataset("synthetic"), SynthConfig()
 

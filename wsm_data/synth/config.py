@@ -29,7 +29,7 @@ class SynthConfig:
         trajectories: trajectories per scene and camera.
         cameras: names out of `CAMERAS`; every scene is recorded once with each.
         group_prefix: groups are named `<prefix>_<camera>`.
-        layout: `scene_archive`, `scene_folder` or `trajectory_folder` (see `writers`).
+        layout: `scene_archive`, `scene_folder` or `trajectory_folder` (see `writers.scenes`).
         matrices: matrices in the parquet files as `nested` lists or `flat` ones.
         image_scale: scale of the images against the cameras' own; below 1 for tests.
         min_frames: shortest trajectory.

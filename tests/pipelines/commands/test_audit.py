@@ -6,7 +6,7 @@ import pytest
 from typer.testing import CliRunner
 
 from pipelines.cli import FailOn, app
-from wsm_data.curation.audit_finding import Severity
+from wsm_data.curation.audit.finding import Severity
 from wsm_data.shards.manifest import release_digest
 
 

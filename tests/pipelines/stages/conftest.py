@@ -24,7 +24,7 @@ from pipelines.stages.split import SplitConfig
 from pipelines.stages.verify import VerifyConfig
 from wsm_data.clips.config import ClipConfig
 from wsm_data.files.jsonlines import read_lines
-from wsm_data.view.clip_survey import SurveyConfig
+from wsm_data.view.release.clip_survey import SurveyConfig
 
 FLOW = ("index", "split", "map", "encode", "pack", "verify", "report")
 DEN = Room(high=(4.0, 2.5, 2.5))

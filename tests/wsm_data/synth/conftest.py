@@ -5,13 +5,13 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from wsm_data.synth import recording
 from wsm_data.synth.config import SynthConfig
-from wsm_data.synth.home import Home, make_home
-from wsm_data.synth.occupancy import SceneColumns, clearance, scene_columns
-from wsm_data.synth.plan import FloorPlan, Opening, Room
-from wsm_data.synth.render import RenderMesh
-from wsm_data.synth.style import Style, choose_style
+from wsm_data.synth.drive.occupancy import SceneColumns, clearance, scene_columns
+from wsm_data.synth.home.floor_plan import FloorPlan, Opening, Room
+from wsm_data.synth.home.home import Home, make_home
+from wsm_data.synth.home.style import Style, choose_style
+from wsm_data.synth.render.render import RenderMesh
+from wsm_data.synth.writers import recording
 
 
 @pytest.fixture(scope="session")
@@ -30,7 +30,7 @@ def standpoints(home: Home, columns: SceneColumns) -> list[tuple[float, float]]:
     room_for = clearance(columns, 1.9, SynthConfig())
     centres = room_for.centres(np.arange(room_for.distance_m.size))
     places = []
-    for room in home.plan.rooms:
+    for room in home.floor_plan.rooms:
         x, y = centres.T
         inside = (x > room.x0) & (x < room.x1) & (y > room.y0) & (y < room.y1)
         best = centres[np.where(inside, room_for.distance_m.ravel(), -1.0).argmax()]

@@ -34,7 +34,7 @@ from wsm_data.shards.manifest import release_digest
 from wsm_data.shards.plan import PlannedClip, plan_shards
 from wsm_data.shards.selection import Selection, selection_path, write_selection
 from wsm_data.shards.writer import write_shard
-from wsm_data.view.selection_survey import SelectionSurvey, SelectionSurveyConfig, survey_selection
+from wsm_data.view.selection.survey import SelectionSurvey, SelectionSurveyConfig, survey_selection
 
 CODEC = DctCodec()
 WIDTH_PX, HEIGHT_PX = 64, 32
