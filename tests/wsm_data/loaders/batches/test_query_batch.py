@@ -2,53 +2,37 @@ import numpy as np
 import pytest
 import torch
 
-from wsm_data.loaders.batches.query_batch import QueryBatch, QueryMap
-from wsm_data.maps.geodesic import geodesic_distance
-from wsm_data.maps.progress import field_to_mm, sample_distance
+from wsm_data.loaders.batches.query_batch import QueryBatch
 from wsm_data.schema.occupancy import OCCUPIED, UNKNOWN, OccupancyGrid
 
-RESOLUTION_M, RADIUS_M, GOAL_RADIUS_M = 0.05, 0.1, 0.2
-
-
-def room(rows, columns, origin_cell):
-    """A free room with a wall that leaves a gap at its far end."""
-    cells = np.zeros((rows, columns), np.uint8)
-    cells[: rows - 10, columns // 2] = OCCUPIED
-    return OccupancyGrid(cells=cells, origin_cell=origin_cell, resolution_m=RESOLUTION_M)
-
-
-GRIDS = (room(40, 60, (-17, 3)), room(30, 44, (5, -8)))
-
-
-def field_of(grid):
-    low = np.array(grid.origin_xy_m)
-    goal = low + (np.array(grid.cells.shape[::-1]) - 6) * RESOLUTION_M
-    return geodesic_distance(grid, goal, RADIUS_M, GOAL_RADIUS_M)
+SHAPES = ((40, 60), (30, 44))
+GRIDS = [
+    OccupancyGrid(cells=np.full(shape, OCCUPIED, np.uint8), origin_cell=origin_cell, resolution_m=0.05)
+    for shape, origin_cell in zip(SHAPES, ((-17, 3), (5, -8)), strict=True)
+]
 
 
 @pytest.fixture(scope="module")
 def batch():
     """Two maps of different sizes in one batch; what has nothing to do with maps is left out."""
-    shape = (2, 40, 60)
-    occupancy, geodesic_mm = np.full(shape, UNKNOWN, np.uint8), np.full(shape, 65535, np.uint16)
-    for number, grid in enumerate(GRIDS):
-        rows, columns = grid.cells.shape
-        occupancy[number, :rows, :columns] = grid.cells
-        geodesic_mm[number, :rows, :columns] = field_to_mm(field_of(grid))
+    occupancy, geodesic_mm = np.full((2, 40, 60), UNKNOWN, np.uint8), np.full((2, 40, 60), 65535, np.uint16)
+    for number, (rows, columns) in enumerate(SHAPES):
+        occupancy[number, :rows, :columns] = OCCUPIED
+        geodesic_mm[number, :rows, :columns] = number
     nothing = torch.zeros(2)
     return QueryBatch(
         history=None,
         replan_latent=nothing,
         occupancy=torch.from_numpy(occupancy),
         geodesic_mm=torch.from_numpy(geodesic_mm),
-        map_shape=torch.tensor([grid.cells.shape for grid in GRIDS]),
+        map_shape=torch.tensor(SHAPES),
         map_origin_m=torch.tensor([grid.origin_xy_m for grid in GRIDS], dtype=torch.float64),
-        resolution_m=torch.full((2,), RESOLUTION_M, dtype=torch.float64),
+        resolution_m=torch.full((2,), 0.05, dtype=torch.float64),
         T_world_camera0=nothing,
         T_world_camera=nothing,
         goal_world_m=nothing,
         goal_radius_m=nothing,
-        robot_radius_m=torch.full((2,), RADIUS_M, dtype=torch.float64),
+        robot_radius_m=torch.tensor([0.1, 0.2], dtype=torch.float64),
         expert_distance_m=nothing,
     )
 
@@ -58,51 +42,6 @@ def test_a_map_comes_back_as_it_was_without_the_padding(batch, number):
     found = batch.map_of(number)
     np.testing.assert_array_equal(found.grid.cells, GRIDS[number].cells)
     assert found.grid.origin_cell == GRIDS[number].origin_cell
-    assert found.grid.resolution_m == RESOLUTION_M
-    assert found.robot_radius_m == RADIUS_M
-
-
-@pytest.mark.parametrize("number", [0, 1])
-def test_distances_are_those_of_the_field_to_half_a_millimetre(batch, number):
-    grid = GRIDS[number]
-    rng = np.random.default_rng(number)
-    size_m = np.array(grid.cells.shape[::-1]) * RESOLUTION_M
-    points = np.array(grid.origin_xy_m) + rng.uniform(-0.1, 1.1, (4, 50, 2)) * size_m
-    expected = sample_distance(field_of(grid), grid, points.reshape(-1, 2)).reshape(4, 50)
-    found = batch.map_of(number).distance_m(points)
-    assert found.shape == (4, 50)
-    np.testing.assert_array_equal(np.isfinite(found), np.isfinite(expected))
-    finite = np.isfinite(expected)
-    assert 50 < finite.sum() < 200
-    # stored millimetres are off by half of one; interpolation does not add to it
-    np.testing.assert_allclose(found[finite], expected[finite], rtol=0, atol=0.00051)
-
-
-def test_progress_is_what_each_step_gains(batch):
-    found = batch.map_of(0)
-    straight = np.array(GRIDS[0].origin_xy_m) + np.stack([np.linspace(2.0, 2.3, 7), np.full(7, 1.0)], axis=1)
-    distance = found.distance_m(straight)
-    np.testing.assert_allclose(found.progress_m(straight), distance[:-1] - distance[1:])
-    assert found.progress_m(straight).sum() == pytest.approx(distance[0] - distance[-1])
-    # around the gap of the wall the way is longer than the flight: 0.3 m nearer, no more
-    assert 0 < found.progress_m(straight).sum() <= 0.3 + 0.001
-
-
-def test_progress_out_of_the_map_is_not_finite(batch):
-    path = np.array([[-50.0, 0.0], [-50.1, 0.0], GRIDS[0].origin_xy_m])
-    assert not np.isfinite(batch.map_of(0).progress_m(path)).any()
-
-
-def test_a_path_is_free_where_the_footprint_fits(batch):
-    found = batch.map_of(0)
-    low = np.array(GRIDS[0].origin_xy_m)
-    before = low + np.array([[0.5, 0.5], [1.2, 0.5]])
-    through = low + np.array([[0.5, 0.5], [2.5, 0.5]])  # the wall stands between two free positions
-    outside = low + np.array([[0.5, 0.5], [-0.5, 0.5]])
-    assert (found.is_free(before), found.is_free(through), found.is_free(outside)) == (True, False, False)
-
-
-def test_a_map_may_have_no_distance_at_all():
-    grid = GRIDS[1]
-    nowhere = QueryMap(grid=grid, geodesic_mm=np.full(grid.cells.shape, 65535, np.uint16), robot_radius_m=RADIUS_M)
-    assert nowhere.distance_m(np.array([0.3, 0.1])) == np.inf
+    assert found.grid.resolution_m == 0.05
+    assert found.robot_radius_m == [0.1, 0.2][number]
+    np.testing.assert_array_equal(found.geodesic_mm, np.full(SHAPES[number], number))
