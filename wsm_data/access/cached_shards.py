@@ -10,13 +10,13 @@ from itertools import accumulate
 from pathlib import Path
 
 from wsm_data.access.announcements import Announcements
+from wsm_data.access.config import AccessConfig
 from wsm_data.access.local_shards import read_scattered
 from wsm_data.access.ranges import open_remote_store
 from wsm_data.access.shard_cache import CachedShard, Download, Refusal, ShardCache
 from wsm_data.access.shard_download import fill
 from wsm_data.access.shard_reader import Span, missing_shard, short_shard
 from wsm_data.errors import ConfigError, StoreError, WsmError
-from wsm_data.loaders.config import ReadConfig
 from wsm_data.shards.manifest import ReleaseManifest, release_digest
 
 _LOGGER = logging.getLogger(__name__)
@@ -36,25 +36,25 @@ class CachedShards:
     that it would displace what is needed earlier.
     """
 
-    def __init__(self, root: str, manifest: ReleaseManifest, read: ReadConfig):
+    def __init__(self, root: str, manifest: ReleaseManifest, config: AccessConfig):
         """Connect to the release at the URL `root`, and open the cache.
 
         Raises:
             ConfigError: the cache has no folder, or could not hold the largest shard; fsspec does not know such URLs.
         """
-        if not read.cache_dir:
-            raise ConfigError(f"cache_dir must name a folder, to read {root} with access = {read.access}; found none")
+        if not config.cache_dir:
+            raise ConfigError(f"cache_dir must name a folder, to read {root} with access = {config.access}; found none")
         digest = release_digest(manifest)
         self._shards = {
             shard.name: CachedShard(digest=digest, name=shard.name, bytes=shard.bytes, sha256=shard.sha256)
             for shard in manifest.shards
         }
-        self._limit_bytes = int(read.cache_gib * (1 << 30))
-        self._cache = ShardCache(Path(read.cache_dir), self._limit_bytes)
+        self._limit_bytes = int(config.cache_gib * (1 << 30))
+        self._cache = ShardCache(Path(config.cache_dir), self._limit_bytes)
         self._cache.require_room_for(self._shards.values())
-        self._store = open_remote_store(root, read)
-        self._fetch_threads = read.fetch_threads
-        self._parts = ThreadPoolExecutor(read.fetch_threads, thread_name_prefix="wsm-fetch")
+        self._store = open_remote_store(root, config)
+        self._fetch_threads = config.fetch_threads
+        self._parts = ThreadPoolExecutor(config.fetch_threads, thread_name_prefix="wsm-fetch")
         self._closed = threading.Event()
         self._changed = threading.Condition()
         self._announced: Announcements[None] = Announcements()

@@ -1,15 +1,15 @@
 """Which reader the shards of a release need."""
 
 from wsm_data.access.cached_shards import CachedShards
+from wsm_data.access.config import AccessConfig, RemoteAccess
 from wsm_data.access.local_shards import LocalShards
 from wsm_data.access.ranges import RangeReader
 from wsm_data.access.release import Release
 from wsm_data.access.shard_reader import ShardReader
 from wsm_data.files.stores import LocalStore
-from wsm_data.loaders.config import ReadConfig, RemoteAccess
 
 
-def open_shards(release: Release, read: ReadConfig) -> ShardReader:
+def open_shards(release: Release, config: AccessConfig) -> ShardReader:
     """A reader of the shards of a release, by where they are.
 
     Raises:
@@ -17,11 +17,11 @@ def open_shards(release: Release, read: ReadConfig) -> ShardReader:
     """
     if isinstance(release.store, LocalStore):
         return LocalShards(release.store.root)
-    if read.access is RemoteAccess.SHARDS:
-        return CachedShards(release.store.root, release.manifest, read)
-    return RangeReader(release.store.root, read)
+    if config.access is RemoteAccess.SHARDS:
+        return CachedShards(release.store.root, release.manifest, config)
+    return RangeReader(release.store.root, config)
 
 
-def reads_again_what_it_read(release: Release, read: ReadConfig) -> bool:
+def reads_again_what_it_read(release: Release, config: AccessConfig) -> bool:
     """Whether a clip comes from the same bytes each time, those of a disk or a cache, and not by a new transfer."""
-    return isinstance(release.store, LocalStore) or read.access is RemoteAccess.SHARDS
+    return isinstance(release.store, LocalStore) or config.access is RemoteAccess.SHARDS

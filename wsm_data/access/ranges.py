@@ -7,17 +7,17 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 
 from wsm_data.access.announcements import Announcements
+from wsm_data.access.config import AccessConfig
 from wsm_data.access.shard_reader import Span, missing_shard, short_shard
 from wsm_data.errors import ConfigError
 from wsm_data.files.fsspec_store import FsspecStore
 from wsm_data.files.retries import RequestConfig
-from wsm_data.loaders.config import ReadConfig
 
 _MERGED_BYTES = 8 << 20  # a request this large costs little more than its transfer
 _AHEAD_BYTES_PER_THREAD = 16 << 20
 
 
-def open_remote_store(root: str, read: ReadConfig) -> FsspecStore:
+def open_remote_store(root: str, config: AccessConfig) -> FsspecStore:
     """A connection of its own to the release at `root`, asked as a loader's settings say.
 
     Raises:
@@ -25,10 +25,10 @@ def open_remote_store(root: str, read: ReadConfig) -> FsspecStore:
     """
     try:
         request = RequestConfig(
-            attempts=read.attempts,
-            first_backoff_s=read.first_backoff_s,
-            timeout_s=read.request_timeout_s,
-            connections=read.fetch_threads,
+            attempts=config.attempts,
+            first_backoff_s=config.first_backoff_s,
+            timeout_s=config.request_timeout_s,
+            connections=config.fetch_threads,
         )
     except ValueError as error:
         raise ConfigError(f"the settings of a loader's reading must hold: {error}") from error
@@ -85,15 +85,15 @@ class RangeReader:
     them have gone another way.
     """
 
-    def __init__(self, root: str, read: ReadConfig):
+    def __init__(self, root: str, config: AccessConfig):
         """Connect to the release at the URL `root`.
 
         Raises:
             ConfigError: fsspec does not know such URLs, or the settings of requests contradict themselves.
         """
-        self._store = open_remote_store(root, read)
-        self._threads = ThreadPoolExecutor(read.fetch_threads, thread_name_prefix="wsm-fetch")
-        self._ahead_bytes = _AHEAD_BYTES_PER_THREAD * read.fetch_threads
+        self._store = open_remote_store(root, config)
+        self._threads = ThreadPoolExecutor(config.fetch_threads, thread_name_prefix="wsm-fetch")
+        self._ahead_bytes = _AHEAD_BYTES_PER_THREAD * config.fetch_threads
         self._lock = threading.Lock()
         self._queue: deque[_Fetch] = deque()
         self._begun: list[_Fetch] = []

@@ -8,7 +8,7 @@ import math
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from wsm_data.files.retries import RequestConfig
+from wsm_data.access.config import AccessConfig
 
 MAX_CHUNK_LATENTS = 4
 """Largest chunk size K (paper, implementation details: K is drawn from 1 to 4)."""
@@ -36,13 +36,6 @@ class Verify(StrEnum):
     ALWAYS = "always"
     FIRST = "first"
     NEVER = "never"
-
-
-class RemoteAccess(StrEnum):
-    """How shards behind a URL are read."""
-
-    RANGES = "ranges"
-    SHARDS = "shards"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,8 +113,8 @@ class OrderConfig:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ReadConfig:
-    """How the bytes of a batch get into memory; none of this changes what is delivered.
+class ReadConfig(AccessConfig):
+    """How the bytes of a batch get into memory, beside how a store is asked; none of it changes what is delivered.
 
     Attributes:
         verify: when checksums are compared: `first` time a process reads a clip, `always`, or `never`. Worker processes
@@ -134,13 +127,6 @@ class ReadConfig:
         dtype: dtype of the latents of a batch: `float32`, `bfloat16`, or `float16`.
         device: where batches are delivered, as torch spells it.
         pin_memory: read into page-locked memory, so that the transfer to a GPU runs beside the training step.
-        access: for URLs: single ranges, or whole shards into the cache.
-        cache_dir: folder of the cache of whole shards; needed for `access = shards`.
-        cache_gib: most bytes the cache may hold, GiB.
-        fetch_threads: requests to a store at the same time.
-        attempts: how often a request is tried before the run stops.
-        first_backoff_s: pause after the first failed attempt, s; it doubles with each further one.
-        request_timeout_s: longest time of one attempt for every 8 MiB asked for, or part of them, s.
     """
 
     verify: Verify = Verify.FIRST
@@ -151,17 +137,10 @@ class ReadConfig:
     dtype: str = "float32"
     device: str = "cpu"
     pin_memory: bool = False
-    access: RemoteAccess = RemoteAccess.RANGES
-    cache_dir: str = ""
-    cache_gib: float = 50.0
-    fetch_threads: int = 8
-    attempts: int = RequestConfig.attempts
-    first_backoff_s: float = RequestConfig.first_backoff_s
-    request_timeout_s: float = RequestConfig.timeout_s
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "verify", Verify(self.verify))  # words, as files and users spell them
-        object.__setattr__(self, "access", RemoteAccess(self.access))
+        super().__post_init__()
+        object.__setattr__(self, "verify", Verify(self.verify))  # a word, as files and users spell it
         for name in ("threads", "workers", "prefetch_batches"):
             if getattr(self, name) < 0:
                 raise ValueError(f"{name} must not be negative, found {getattr(self, name)}")

@@ -8,20 +8,20 @@ from typer.testing import CliRunner
 
 from pipelines.cli import app
 from wsm_data.access.cached_shards import CachedShards
+from wsm_data.access.config import AccessConfig, RemoteAccess
 from wsm_data.access.local_shards import LocalShards
 from wsm_data.access.open_shards import open_shards
 from wsm_data.access.ranges import RangeReader
 from wsm_data.access.release import open_release
 from wsm_data.access.verify import verify_release
 from wsm_data.errors import IntegrityError, StoreError
-from wsm_data.loaders.config import ReadConfig, RemoteAccess
 
 TRANSIENT = (Fault.SLOW_DOWN, Fault.RESET, Fault.CUT_BODY, Fault.SHORT_BODY)
 
 
 @pytest.mark.parametrize("access", list(RemoteAccess))
 def test_a_folder_is_read_where_it_lies(published, access):
-    reader = open_shards(open_release(published.folder), ReadConfig(access=access))
+    reader = open_shards(open_release(published.folder), AccessConfig(access=access))
     reader.close()
     assert type(reader) is LocalShards
 

@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 
-from wsm_data.files.retries import RequestConfig
 from wsm_data.loaders.config import Arrangement, LoaderConfig, OrderConfig, ReadConfig, SourceConfig
 from wsm_data.loaders.order.mixing import stretch_of_epoch
 from wsm_data.loaders.order.stable_hash import mix64
@@ -56,12 +55,6 @@ def test_rows_have_a_length_where_they_are_packed_and_nowhere_else():
 def test_chunks_have_at_least_one_latent(sizes):
     with pytest.raises(ValueError, match="chunk_sizes"):
         OrderConfig(chunk_sizes=sizes)
-
-
-def test_requests_have_the_defaults_of_the_store():
-    read, request = ReadConfig(), RequestConfig()
-    assert (read.attempts, read.first_backoff_s) == (request.attempts, request.first_backoff_s)
-    assert read.request_timeout_s == request.timeout_s
 
 
 def test_a_loader_needs_nothing_but_sources():

@@ -9,8 +9,9 @@ from contextlib import ExitStack
 import pytest
 from fault_proxy import Fault
 
+from wsm_data.access.config import RemoteAccess
 from wsm_data.errors import StoreError
-from wsm_data.loaders.config import LoaderConfig, OrderConfig, RemoteAccess, SourceConfig
+from wsm_data.loaders.config import LoaderConfig, OrderConfig, SourceConfig
 from wsm_data.loaders.loader import ClipLoader
 from wsm_data.loaders.queries import QueryLoader
 from wsm_data.loaders.sources.queries import QueryConfig

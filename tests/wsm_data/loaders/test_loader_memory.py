@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from wsm_data.access.config import RemoteAccess
 from wsm_data.loaders.batches import buffers
-from wsm_data.loaders.config import LoaderConfig, OrderConfig, ReadConfig, RemoteAccess, SourceConfig
+from wsm_data.loaders.config import LoaderConfig, OrderConfig, ReadConfig, SourceConfig
 from wsm_data.loaders.loader import ClipLoader
 
 WARM_UP_EPOCHS, EPOCHS = 5, 20

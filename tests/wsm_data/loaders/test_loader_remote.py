@@ -6,8 +6,9 @@ from dataclasses import replace
 import pytest
 from fault_proxy import Fault
 
+from wsm_data.access.config import RemoteAccess
 from wsm_data.errors import IntegrityError, StoreError
-from wsm_data.loaders.config import LoaderConfig, OrderConfig, ReadConfig, RemoteAccess, SourceConfig
+from wsm_data.loaders.config import LoaderConfig, OrderConfig, ReadConfig, SourceConfig
 from wsm_data.loaders.loader import ClipLoader
 
 GIB = 1 << 30

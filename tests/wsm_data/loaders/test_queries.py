@@ -6,18 +6,10 @@ import pytest
 import torch
 import torch.utils.data
 
+from wsm_data.access.config import RemoteAccess
 from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.geometry.transform import transforms_from_vectors
-from wsm_data.loaders.config import (
-    Arrangement,
-    LoaderConfig,
-    OrderConfig,
-    ReadConfig,
-    Remainder,
-    RemoteAccess,
-    SourceConfig,
-    Verify,
-)
+from wsm_data.loaders.config import Arrangement, LoaderConfig, OrderConfig, ReadConfig, Remainder, SourceConfig, Verify
 from wsm_data.loaders.ledger.audit import audit_epochs
 from wsm_data.loaders.ledger.sources import open_recorded_sources
 from wsm_data.loaders.ledger.timeline import read_timeline

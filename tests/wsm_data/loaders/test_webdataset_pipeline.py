@@ -9,8 +9,9 @@ import torch.utils.data
 import webdataset
 from fault_proxy import Fault
 
+from wsm_data.access.config import RemoteAccess
 from wsm_data.errors import ConfigError, IntegrityError
-from wsm_data.loaders.config import Arrangement, OrderConfig, ReadConfig, Remainder, RemoteAccess, SourceConfig, Verify
+from wsm_data.loaders.config import Arrangement, OrderConfig, ReadConfig, Remainder, SourceConfig, Verify
 from wsm_data.loaders.order.epoch_plan import plan_epoch
 from wsm_data.loaders.sources.clips import open_sources
 from wsm_data.loaders.webdataset_pipeline import as_webdataset

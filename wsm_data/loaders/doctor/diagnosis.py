@@ -3,7 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from wsm_data.loaders.config import Arrangement, OrderConfig, ReadConfig, RemoteAccess, Verify
+from wsm_data.access.config import RemoteAccess
+from wsm_data.loaders.config import Arrangement, OrderConfig, ReadConfig, Verify
 from wsm_data.loaders.timing import Part
 
 KEEPS_UP_SHARE = 0.05

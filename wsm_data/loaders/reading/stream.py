@@ -6,8 +6,9 @@ from functools import partial
 from itertools import chain, islice, repeat
 from typing import Generic, TypeVar
 
+from wsm_data.access.config import RemoteAccess
 from wsm_data.loaders.batches.batch import PackedBatch
-from wsm_data.loaders.config import ReadConfig, RemoteAccess
+from wsm_data.loaders.config import ReadConfig
 from wsm_data.loaders.order.epoch_plan import EpochPlan
 from wsm_data.loaders.reading.prefetch import Prefetch, Work, done_alone
 from wsm_data.loaders.reading.step_reader import StepReader, StepWork

@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wsm_data.loaders.config import Arrangement, OrderConfig, ReadConfig, RemoteAccess, Verify
+from wsm_data.access.config import RemoteAccess
+from wsm_data.loaders.config import Arrangement, OrderConfig, ReadConfig, Verify
 from wsm_data.loaders.doctor.diagnosis import LoaderRun, SourceFacts, cautions, diagnose, readers
 from wsm_data.loaders.timing import Part
 

@@ -4,7 +4,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from wsm_data.loaders.config import ReadConfig, RemoteAccess
+from wsm_data.access.config import RemoteAccess
+from wsm_data.loaders.config import ReadConfig
 from wsm_data.loaders.reading.stream import open_stream
 from wsm_data.loaders.timing import Timing
 

@@ -1,6 +1,7 @@
 import pytest
 
-from wsm_data.loaders.config import ReadConfig, RemoteAccess, SourceConfig, Verify
+from wsm_data.access.config import RemoteAccess
+from wsm_data.loaders.config import ReadConfig, SourceConfig, Verify
 from wsm_data.loaders.reading.verification import Verification, verification_of
 from wsm_data.loaders.sources.clips import open_sources
 
