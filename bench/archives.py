@@ -21,7 +21,7 @@ from isal import igzip
 from reporting import machine, machine_line, table, write_results
 from zlib_ng import gzip_ng
 
-from wsm_data.readers.tar_walk import walk_tar
+from wsm_data.readers.archive.tar_walk import walk_tar
 
 FRAMES = 160
 DISTINCT_FRAMES = 40

@@ -14,7 +14,7 @@ from wsm_data.shards.index_row import SCHEMA
 from wsm_data.shards.manifest import ReleaseManifest, ShardInfo, manifest_bytes
 from wsm_data.shards.members import MEMBER_NAMES, META, STORED_DTYPES, shape_of
 from wsm_data.shards.names import INDEX_NAME, MANIFEST_NAME, shard_name
-from wsm_data.shards.plan import DEFAULT_SHARD_BYTES
+from wsm_data.shards.shard_layout import DEFAULT_SHARD_BYTES
 from wsm_data.shards.statistics import LatentStatistics
 
 GROUPS = ("gibson_d435i", "gibson_zed", "hssd_d435i", "hssd_zed", "matterport_d435i", "matterport_zed")

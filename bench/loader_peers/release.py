@@ -15,7 +15,7 @@ from wsm_data.schema.identity import EpisodeId
 from wsm_data.shards.assemble import ReleaseFacts, finish_release
 from wsm_data.shards.fragment import build_fragment, fragment_path, read_fragment_info, write_fragment
 from wsm_data.shards.inventory import InventoryRow, UnitState
-from wsm_data.shards.plan import PlannedClip, plan_shards
+from wsm_data.shards.shard_layout import PlacedClip, lay_out_shards
 from wsm_data.shards.writer import write_shard
 
 SHARD_BYTES = 100 << 20
@@ -28,7 +28,7 @@ def write_release(folder: Path) -> None:
     """A release of all clips in shards of 100 MB; the order of the clips in it is mixed, as in every release."""
     fragments = folder.with_name(f"{folder.name}.fragments")
     clips = [_store(fragments, number) for number in range(CLIPS)]
-    plans = plan_shards(clips, shard_bytes=SHARD_BYTES)
+    layouts = lay_out_shards(clips, shard_bytes=SHARD_BYTES)
     facts = ReleaseFacts(
         name="bench",
         codec=CODEC,
@@ -40,8 +40,10 @@ def write_release(folder: Path) -> None:
     finish_release(
         folder,
         facts,
-        plans=plans,
-        shards=[write_shard(folder / plan.name, plan, lambda key: fragment_path(fragments, key)) for plan in plans],
+        layouts=layouts,
+        shards=[
+            write_shard(folder / layout.name, layout, lambda key: fragment_path(fragments, key)) for layout in layouts
+        ],
         read_info=lambda key: read_fragment_info(fragment_path(fragments, key)),
         inventory=[
             InventoryRow(unit=_id(number).text, container="bench", state=UnitState.CLIP, split="train")
@@ -56,9 +58,9 @@ def _id(number: int) -> EpisodeId:
     return EpisodeId.parse(f"bench/home_{number % 10:04d}/{number:06d}")
 
 
-def _store(fragments: Path, number: int) -> PlannedClip:
+def _store(fragments: Path, number: int) -> PlacedClip:
     path = write_fragment(fragments, build_fragment(_clip(number)))
-    return PlannedClip(key=_id(number).key, split="train", size_bytes=path.stat().st_size)
+    return PlacedClip(key=_id(number).key, split="train", size_bytes=path.stat().st_size)
 
 
 def _clip(number: int) -> Clip:

@@ -12,7 +12,7 @@ from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.files.atomic import write_text
 from wsm_data.files.digest import digest_json
 from wsm_data.files.typed_toml import build_config
-from wsm_data.readers.containers import Container, Layout
+from wsm_data.readers.interndata.containers import Container, Layout
 from wsm_data.schema.dataset import DatasetManifest
 
 _ABOUT_THE_PUBLISHER = ("licence", "homepage", "expected_episodes")

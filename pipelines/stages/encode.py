@@ -24,8 +24,8 @@ from wsm_data.files.atomic import write_text
 from wsm_data.files.digest import sha256_bytes
 from wsm_data.files.typed_toml import INPUT, SELECTION
 from wsm_data.maps.scene_map import SceneMap, floor_levels, load_scene_map
-from wsm_data.readers.containers import Container
-from wsm_data.readers.frames import iter_episode_frames
+from wsm_data.readers.interndata.containers import Container
+from wsm_data.readers.interndata.frames import iter_episode_frames
 from wsm_data.readers.record_table import read_records
 from wsm_data.schema.arrays import Float32Array
 from wsm_data.schema.episode import EpisodeRecord

@@ -20,10 +20,10 @@ from wsm_data.errors import DataError, Reason
 from wsm_data.files.digest import digest_json, sha256_file
 from wsm_data.files.typed_toml import INPUT
 from wsm_data.maps.voxels import save_voxels, voxels_digest, voxels_from_cloud, voxels_from_depth
-from wsm_data.readers.containers import Container, find_containers
+from wsm_data.readers.interndata.containers import Container, find_containers
+from wsm_data.readers.interndata.scan import ContainerScan, scan_container
 from wsm_data.readers.manifest import load_dataset
 from wsm_data.readers.record_table import write_records
-from wsm_data.readers.scan import ContainerScan, scan_container
 from wsm_data.schema.dataset import DatasetManifest
 from wsm_data.schema.episode import EpisodeRecord
 from wsm_data.schema.verdict import Refusal

@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass, field
 
 from pipelines.artifacts.layout import release_folder
 from pipelines.running.stage import Finished, Outcome, Settled, Stage, StageContext, Unit
-from wsm_data.access.materialise import copy_shard, finish_selection, plan_selection
+from wsm_data.access.materialise import copy_shard, finish_selection, lay_out_selection
 from wsm_data.access.release import Release, open_release
 from wsm_data.files.digest import digest_json, sha256_bytes
 from wsm_data.files.stores import open_store
@@ -37,14 +37,14 @@ def _open(config: MaterialiseConfig) -> tuple[Release, Selection]:
 
 def _list_units(config: MaterialiseConfig) -> Sequence[Unit]:
     release, selection = _open(config)
-    plans = plan_selection(release, selection, config.shard_mib << 20)
+    layouts = lay_out_selection(release, selection, config.shard_mib << 20)
     return [
         Unit(
-            id=plan.name,
-            inputs={"parent": release.digest, "clips": digest_json([one.key for one in plan.clips])},
-            payload=plan,
+            id=layout.name,
+            inputs={"parent": release.digest, "clips": digest_json([one.key for one in layout.clips])},
+            payload=layout,
         )
-        for plan in plans
+        for layout in layouts
     ]
 
 
@@ -63,13 +63,13 @@ def _finish(config: MaterialiseConfig, context: StageContext, settled: Settled) 
     if settled.pending:
         return Finished()
     release, selection = _open(config)
-    plans = plan_selection(release, selection, config.shard_mib << 20)
+    layouts = lay_out_selection(release, selection, config.shard_mib << 20)
     finish_selection(
         release_folder(context.out),
         release,
         selection,
-        plans=plans,
-        shards=[ShardInfo(**settled.outcomes[plan.name].facts["shard"]) for plan in plans],
+        layouts=layouts,
+        shards=[ShardInfo(**settled.outcomes[layout.name].facts["shard"]) for layout in layouts],
         fingerprints=_selection_digest(config),
     )
     folder = release_folder(context.out).relative_to(context.out)

@@ -23,7 +23,7 @@ from wsm_data.shards.assemble import ReleaseFacts, finish_release
 from wsm_data.shards.fragment import fragment_path, read_fragment_info
 from wsm_data.shards.manifest import ShardInfo
 from wsm_data.shards.names import INDEX_NAME, INVENTORY_NAME, MANIFEST_NAME, QUARANTINE_NAME
-from wsm_data.shards.plan import PlannedClip, ShardPlan, plan_shards
+from wsm_data.shards.shard_layout import PlacedClip, ShardLayout, lay_out_shards
 from wsm_data.shards.writer import write_shard
 
 _SHOWN_REASONS = 3
@@ -65,18 +65,18 @@ def _list_units(config: PackConfig) -> Sequence[Unit]:
     outcomes = _clips(config)
     splits = read_split(config.split)
     clips = [
-        PlannedClip(key=EpisodeId.parse(name).key, split=splits[name], size_bytes=outcome.facts["bytes"])
+        PlacedClip(key=EpisodeId.parse(name).key, split=splits[name], size_bytes=outcome.facts["bytes"])
         for name, outcome in outcomes.items()
     ]
     digests = {EpisodeId.parse(name).key: outcome.digest for name, outcome in outcomes.items()}
-    plans = plan_shards(clips, shard_bytes=config.shard_mib << 20, seed=config.seed)
+    layouts = lay_out_shards(clips, shard_bytes=config.shard_mib << 20, seed=config.seed)
     return [
         Unit(
-            id=plan.name,
-            inputs={"clips": digest_json([[one.key, digests[one.key]] for one in plan.clips])},
-            payload=plan,
+            id=layout.name,
+            inputs={"clips": digest_json([[one.key, digests[one.key]] for one in layout.clips])},
+            payload=layout,
         )
-        for plan in plans
+        for layout in layouts
     ]
 
 
@@ -115,10 +115,10 @@ def _require_complete(config: PackConfig) -> None:
 def _process(batch: Sequence[Unit], config: PackConfig, context: StageContext) -> Iterator[Outcome]:
     release, clips = release_folder(context.out), clips_folder(config.encode)
     for unit in batch:
-        plan: ShardPlan = unit.payload
+        layout: ShardLayout = unit.payload
         (release / MANIFEST_NAME).unlink(missing_ok=True)  # a release that is being rewritten is unfinished
-        path = release / plan.name
-        shard = write_shard(path, plan, lambda key: fragment_path(clips, key))
+        path = release / layout.name
+        shard = write_shard(path, layout, lambda key: fragment_path(clips, key))
         facts = {"clips": shard.clips, "bytes": shard.bytes, "shard": asdict(shard)}
         yield Outcome(unit=unit.id, digest=shard.sha256, outputs=(str(path.relative_to(context.out)),), facts=facts)
 
@@ -127,7 +127,7 @@ def _finish(config: PackConfig, context: StageContext, settled: Settled) -> Fini
     """Write index, inventory and manifest once every shard stands."""
     if settled.pending:
         return Finished()
-    plans = [unit.payload for unit in _list_units(config)]
+    layouts = [unit.payload for unit in _list_units(config)]
     clips = _clips(config)
     folder = clips_folder(config.encode)
     digests = {name: outcome.facts["source_digest"] for name, outcome in clips.items()}
@@ -135,8 +135,8 @@ def _finish(config: PackConfig, context: StageContext, settled: Settled) -> Fini
     finish_release(
         release_folder(context.out),
         _facts(config, clips),
-        plans=plans,
-        shards=[ShardInfo(**settled.outcomes[plan.name].facts["shard"]) for plan in plans],
+        layouts=layouts,
+        shards=[ShardInfo(**settled.outcomes[layout.name].facts["shard"]) for layout in layouts],
         read_info=lambda key: read_fragment_info(fragment_path(folder, key)),
         inventory=account.rows,
         refusals=account.quarantine,

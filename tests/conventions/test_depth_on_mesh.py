@@ -18,8 +18,8 @@ from wsm_data.codecs.depth import depth_m_from_latent_video
 from wsm_data.codecs.images import decode_depth
 from wsm_data.geometry.camera import T_OPENGL_OPENCV, unproject
 from wsm_data.geometry.transform import transform_points, transforms_from_vectors
-from wsm_data.readers.containers import find_containers
-from wsm_data.readers.frames import iter_episode_frames
+from wsm_data.readers.interndata.containers import find_containers
+from wsm_data.readers.interndata.frames import iter_episode_frames
 from wsm_data.readers.manifest import MANIFEST_FOLDER, load_dataset
 from wsm_data.readers.record_table import read_records
 from wsm_data.schema.depth import DepthRange

@@ -2,7 +2,7 @@
 
 from collections import Counter
 
-from wsm_data.readers import gzip_stream, tar_walk
+from wsm_data.readers.archive import gzip_stream, tar_walk
 
 
 def test_an_archive_is_opened_twice_in_a_run_and_nothing_is_unpacked(make_source, run_pipeline, tmp_path, monkeypatch):

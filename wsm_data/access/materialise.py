@@ -23,12 +23,12 @@ from wsm_data.shards.index import IndexTable
 from wsm_data.shards.index_row import REPEATED_COLUMNS, SCHEMA
 from wsm_data.shards.inventory import UnitState
 from wsm_data.shards.manifest import ReleaseManifest, ShardInfo
-from wsm_data.shards.plan import PlannedClip, ShardPlan, plan_shards
 from wsm_data.shards.selection import Selection
+from wsm_data.shards.shard_layout import PlacedClip, ShardLayout, lay_out_shards
 from wsm_data.shards.writer import write_blocks
 
 
-def plan_selection(release: Release, selection: Selection, shard_bytes: int) -> tuple[ShardPlan, ...]:
+def lay_out_selection(release: Release, selection: Selection, shard_bytes: int) -> tuple[ShardLayout, ...]:
     """The shards of a selection: its clips in the order by which releases mix scenes.
 
     Raises:
@@ -37,19 +37,19 @@ def plan_selection(release: Release, selection: Selection, shard_bytes: int) -> 
     rows = pa.array(selection.rows_of(release.index))
     columns = release.index.columns(["key", "split", "clip_size"]).take(rows).to_pydict()
     clips = [
-        PlannedClip(key=key, split=split, size_bytes=size)
+        PlacedClip(key=key, split=split, size_bytes=size)
         for key, split, size in zip(columns["key"], columns["split"], columns["clip_size"], strict=True)
     ]
-    return plan_shards(clips, shard_bytes=shard_bytes)
+    return lay_out_shards(clips, shard_bytes=shard_bytes)
 
 
-def copy_shard(path: Path, plan: ShardPlan, release: Release) -> ShardInfo:
+def copy_shard(path: Path, layout: ShardLayout, release: Release) -> ShardInfo:
     """Write a shard of clips as they stand in the shards of a release; the checksum of every member is compared.
 
     Raises:
         IntegrityError: names the shard and the clip that are damaged.
     """
-    return write_blocks(path, plan, lambda clip: [release.read_clip_bytes(clip.key)])
+    return write_blocks(path, layout, lambda clip: [release.read_clip_bytes(clip.key)])
 
 
 def finish_selection(
@@ -57,7 +57,7 @@ def finish_selection(
     release: Release,
     selection: Selection,
     *,
-    plans: Sequence[ShardPlan],
+    layouts: Sequence[ShardLayout],
     shards: Sequence[ShardInfo],
     fingerprints: Mapping[str, str],
 ) -> ReleaseManifest:
@@ -70,18 +70,18 @@ def finish_selection(
         folder: where the shards are.
         release: what the clips were copied from.
         selection: which clips.
-        plans: what the shards contain.
-        shards: what `copy_shard` returned for each plan, in the same order.
+        layouts: what the shards contain.
+        shards: what `copy_shard` returned for each layout, in the same order.
         fingerprints: of what was done to the release, by name.
 
     Raises:
-        IntegrityError: a shard is missing, or has not the size its plan says.
+        IntegrityError: a shard is missing, or has not the size its layout says.
     """
     begin_release(folder)
-    require_shards(folder, plans, shards)
+    require_shards(folder, layouts, shards)
     parent = release.manifest
     content = ReleaseContent(
-        table=_index(release.index, plans),
+        table=_index(release.index, layouts),
         shards=shards,
         rgb_statistics=parent.rgb_statistics,
         depth_statistics=parent.depth_statistics,
@@ -108,17 +108,17 @@ def _facts(release: Release, selection: Selection, fingerprints: Mapping[str, st
     )
 
 
-def _index(index: IndexTable, plans: Sequence[ShardPlan]) -> pa.Table:
+def _index(index: IndexTable, layouts: Sequence[ShardLayout]) -> pa.Table:
     """Rows of the parent's index in the order of the new shards, with their new places."""
-    clips = [clip for plan in plans for clip in plan.clips]
+    clips = [clip for layout in layouts for clip in layout.clips]
     table = index.columns(SCHEMA.names).take(pa.array(index.rows_of([clip.key for clip in clips])))
     columns = dict(zip(table.column_names, table.columns, strict=True))
-    sizes = [np.array([clip.size_bytes for clip in plan.clips], np.int64) for plan in plans]
+    sizes = [np.array([clip.size_bytes for clip in layout.clips], np.int64) for layout in layouts]
     moved = np.concatenate([np.cumsum(one) - one for one in sizes]) - table["clip_offset"].to_numpy()
     for name in columns:
         if name.endswith("_offset"):
             columns[name] = pa.array(table[name].to_numpy() + moved)
-    columns["shard"] = pa.array([plan.name for plan in plans for _ in plan.clips])
+    columns["shard"] = pa.array([layout.name for layout in layouts for _ in layout.clips])
     columns["position"] = pa.array(np.concatenate([np.arange(len(one), dtype=np.int32) for one in sizes]))
     for name in REPEATED_COLUMNS:  # values that no chosen clip has are left behind
         columns[name] = columns[name].cast(pa.string()).dictionary_encode()

@@ -15,7 +15,7 @@ from wsm_data.codecs.quality import DEPTH_EDGES_M, CodecQuality, clip_quality, d
 from wsm_data.errors import Reason
 from wsm_data.geometry.transform import invert, relative_to_first, transform_points, vectors_from_transforms
 from wsm_data.maps.progress import field_to_mm
-from wsm_data.readers.frames import EpisodeFrames
+from wsm_data.readers.interndata.frames import EpisodeFrames
 from wsm_data.schema.arrays import BoolArray, Float32Array, Float64Array
 from wsm_data.schema.clip import Clip
 from wsm_data.schema.clip_meta import ClipMeta

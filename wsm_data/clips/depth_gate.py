@@ -12,7 +12,7 @@ from wsm_data.codecs.depth import depth_m_from_raw
 from wsm_data.codecs.images import decode_depth
 from wsm_data.errors import DataError
 from wsm_data.geometry.transform import invert, rotation_angle_rad
-from wsm_data.readers.frames import EpisodeFrames
+from wsm_data.readers.interndata.frames import EpisodeFrames
 from wsm_data.schema.arrays import Float32Array, Float64Array
 from wsm_data.schema.dataset import DatasetManifest
 from wsm_data.schema.episode import EpisodeRecord

@@ -24,7 +24,7 @@ from wsm_data.shards.names import (
     TRAIN_SPLIT,
     is_shard_name,
 )
-from wsm_data.shards.plan import ShardPlan
+from wsm_data.shards.shard_layout import ShardLayout
 from wsm_data.shards.statistics import LatentStatistics, LatentSums, latent_statistics, merge_sums
 
 
@@ -55,30 +55,30 @@ def finish_release(
     folder: Path,
     facts: ReleaseFacts,
     *,
-    plans: Sequence[ShardPlan],
+    layouts: Sequence[ShardLayout],
     shards: Sequence[ShardInfo],
     read_info: Callable[[str], FragmentInfo],
     inventory: Sequence[InventoryRow],
     refusals: Iterable[Mapping[str, object]],
 ) -> ReleaseManifest:
-    """Write everything beside the shards, remove shards of earlier plans, and write dataset.json last.
+    """Write everything beside the shards, remove shards of earlier layouts, and write dataset.json last.
 
     Args:
         folder: the release, with all its shards written.
         facts: what cannot be counted.
-        plans: what the shards contain.
-        shards: what `write_shard` returned for each plan, in the same order.
-        read_info: sidecar of a fragment by the key of its clip; called once for each, in the order of the plans.
+        layouts: what the shards contain.
+        shards: what `write_shard` returned for each layout, in the same order.
+        read_info: sidecar of a fragment by the key of its clip; called once for each, in the order of the layouts.
         inventory: every unit that went in.
         refusals: lines of the stages' quarantine files.
 
     Raises:
         ConfigError: a clip was made with another codec, depth range or image size than the release states.
-        IntegrityError: a shard is missing, or has not the size its plan says.
+        IntegrityError: a shard is missing, or has not the size its layout says.
     """
     begin_release(folder)
-    require_shards(folder, plans, shards)
-    table, rgb, depth = _collect(facts, plans, read_info)
+    require_shards(folder, layouts, shards)
+    table, rgb, depth = _collect(facts, layouts, read_info)
     content = ReleaseContent(table=table, shards=shards, rgb_statistics=rgb, depth_statistics=depth)
     return write_release_files(folder, facts, content, inventory, refusals)
 
@@ -117,43 +117,45 @@ def write_release_files(
     return manifest
 
 
-def require_shards(folder: Path, plans: Sequence[ShardPlan], shards: Sequence[ShardInfo]) -> None:
-    """Check that the shards of a release are those that were planned.
+def require_shards(folder: Path, layouts: Sequence[ShardLayout], shards: Sequence[ShardInfo]) -> None:
+    """Check that the shards of a release are those that were laid out.
 
     Raises:
-        IntegrityError: a shard is missing, or has not the size its plan says.
+        IntegrityError: a shard is missing, or has not the size its layout says.
     """
-    for plan, shard in zip(plans, shards, strict=True):
-        path = folder / plan.name
+    for layout, shard in zip(layouts, shards, strict=True):
+        path = folder / layout.name
         found = path.stat().st_size if path.exists() else None
-        if not (shard.name == plan.name and shard.clips == len(plan.clips) and shard.bytes == plan.size_bytes == found):
+        if not (
+            shard.name == layout.name and shard.clips == len(layout.clips) and shard.bytes == layout.size_bytes == found
+        ):
             raise IntegrityError(
-                f"{path} must be the planned shard of {len(plan.clips)} clips and {plan.size_bytes} bytes, but was "
+                f"{path} must be the shard of {len(layout.clips)} clips and {layout.size_bytes} bytes, but was "
                 f"written as {shard.name} of {shard.clips} clips and {shard.bytes} bytes, now {found}; pack again"
             )
 
 
 def _collect(
-    facts: ReleaseFacts, plans: Sequence[ShardPlan], read_info: Callable[[str], FragmentInfo]
+    facts: ReleaseFacts, layouts: Sequence[ShardLayout], read_info: Callable[[str], FragmentInfo]
 ) -> tuple[pa.Table, LatentStatistics, LatentStatistics]:
     """One pass over the sidecars: index and statistics, without keeping the sidecars."""
     tables = [SCHEMA.empty_table()]
     rgb: LatentSums | None = None
     depth: LatentSums | None = None
-    for plan in plans:
-        infos = [_require_same(facts, read_info(clip.key)) for clip in plan.clips]
-        tables.append(index_table(_rows(plan, infos)))
-        if plan.split == TRAIN_SPLIT:
+    for layout in layouts:
+        infos = [_require_same(facts, read_info(clip.key)) for clip in layout.clips]
+        tables.append(index_table(_rows(layout, infos)))
+        if layout.split == TRAIN_SPLIT:
             rgb = merge_sums(([] if rgb is None else [rgb]) + [info.rgb_sums for info in infos])
             depth = merge_sums(([] if depth is None else [depth]) + [info.depth_sums for info in infos])
     table = pa.concat_tables(tables).unify_dictionaries()
     return table, latent_statistics(rgb), latent_statistics(depth)
 
 
-def _rows(plan: ShardPlan, infos: Iterable[FragmentInfo]) -> Iterator[IndexRow]:
+def _rows(layout: ShardLayout, infos: Iterable[FragmentInfo]) -> Iterator[IndexRow]:
     offset = 0
     for position, info in enumerate(infos):
-        yield index_row(info, split=plan.split, shard=plan.name, position=position, clip_offset=offset)
+        yield index_row(info, split=layout.split, shard=layout.name, position=position, clip_offset=offset)
         offset += info.size_bytes
 
 

@@ -10,48 +10,48 @@ from wsm_data.errors import IntegrityError
 from wsm_data.files.atomic import atomic_file
 from wsm_data.shards.fragment import FragmentInfo, read_fragment_info
 from wsm_data.shards.manifest import ShardInfo
-from wsm_data.shards.plan import PlannedClip, ShardPlan
+from wsm_data.shards.shard_layout import PlacedClip, ShardLayout
 from wsm_data.shards.tar_format import END_OF_ARCHIVE
 
 _COPY_BYTES = 4 << 20
 
 
-def write_shard(path: Path, plan: ShardPlan, path_of: Callable[[str], Path]) -> ShardInfo:
-    """Write the shard of a plan at `path`, atomically, in constant memory.
+def write_shard(path: Path, layout: ShardLayout, path_of: Callable[[str], Path]) -> ShardInfo:
+    """Write the shard of a layout at `path`, atomically, in constant memory.
 
     Every fragment is compared with the size and digest in its sidecar while it is copied, so that what was damaged
     since it was encoded does not get into a release.
 
     Args:
-        path: where the shard goes; its name must be that of the plan.
-        plan: the clips and their order.
+        path: where the shard goes; its name must be that of the layout.
+        layout: the clips and their order.
         path_of: path of a fragment by the key of its clip.
 
     Raises:
-        IntegrityError: names the clip whose fragment is missing or disagrees with its sidecar or with the plan.
-        ValueError: the file name is not the plan's.
+        IntegrityError: names the clip whose fragment is missing or disagrees with its sidecar or with the layout.
+        ValueError: the file name is not the layout's.
     """
-    return write_blocks(path, plan, lambda clip: _checked_blocks(path_of(clip.key), clip))
+    return write_blocks(path, layout, lambda clip: _checked_blocks(path_of(clip.key), clip))
 
 
-def write_blocks(path: Path, plan: ShardPlan, blocks_of: Callable[[PlannedClip], Iterable[bytes]]) -> ShardInfo:
-    """Write the shard of a plan at `path`, atomically, from the bytes of its clips.
+def write_blocks(path: Path, layout: ShardLayout, blocks_of: Callable[[PlacedClip], Iterable[bytes]]) -> ShardInfo:
+    """Write the shard of a layout at `path`, atomically, from the bytes of its clips.
 
     Args:
-        path: where the shard goes; its name must be that of the plan.
-        plan: the clips and their order.
-        blocks_of: bytes of a clip: tar headers, members and padding; as many as are planned.
+        path: where the shard goes; its name must be that of the layout.
+        layout: the clips and their order.
+        blocks_of: bytes of a clip: tar headers, members and padding; as many as the layout says.
 
     Raises:
-        IntegrityError: the bytes of a clip are more or fewer than planned.
-        ValueError: the file name is not the plan's.
+        IntegrityError: the bytes of a clip are more or fewer than the layout says.
+        ValueError: the file name is not the layout's.
     """
-    if path.name != plan.name:
-        raise ValueError(f"the shard {plan.name} must be written under its own name, found {path.name}")
+    if path.name != layout.name:
+        raise ValueError(f"the shard {layout.name} must be written under its own name, found {path.name}")
     digest = hashlib.sha256()
     size = 0
     with atomic_file(path) as file:
-        for clip in plan.clips:
+        for clip in layout.clips:
             before = size
             for block in blocks_of(clip):
                 file.write(block)
@@ -62,17 +62,17 @@ def write_blocks(path: Path, plan: ShardPlan, blocks_of: Callable[[PlannedClip],
         file.write(END_OF_ARCHIVE)
         digest.update(END_OF_ARCHIVE)
     return ShardInfo(
-        name=plan.name,
-        split=plan.split,
-        clips=len(plan.clips),
+        name=layout.name,
+        split=layout.split,
+        clips=len(layout.clips),
         bytes=size + len(END_OF_ARCHIVE),
         sha256=digest.hexdigest(),
     )
 
 
-def _checked_blocks(path: Path, clip: PlannedClip) -> Iterator[bytes]:
+def _checked_blocks(path: Path, clip: PlacedClip) -> Iterator[bytes]:
     info = read_fragment_info(path)
-    _require_planned(path, info, clip)
+    _require_as_laid_out(path, info, clip)
     digest = xxhash.xxh3_128()
     size = 0
     try:
@@ -90,9 +90,9 @@ def _checked_blocks(path: Path, clip: PlannedClip) -> Iterator[bytes]:
         )
 
 
-def _require_planned(path: Path, info: FragmentInfo, clip: PlannedClip) -> None:
+def _require_as_laid_out(path: Path, info: FragmentInfo, clip: PlacedClip) -> None:
     if (info.key, info.size_bytes) != (clip.key, clip.size_bytes):
         raise IntegrityError(
-            f"clip {clip.key}: the plan expects a fragment of {clip.size_bytes} bytes, but {path} holds {info.key} "
-            f"with {info.size_bytes} bytes; it was encoded again since, so plan again"
+            f"clip {clip.key}: the layout expects a fragment of {clip.size_bytes} bytes, but {path} holds {info.key} "
+            f"with {info.size_bytes} bytes; it was encoded again since; run `wsm pack` again"
         )

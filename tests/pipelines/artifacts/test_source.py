@@ -12,7 +12,7 @@ from pipelines.artifacts.source import container_from_json, container_json, conv
 from pipelines.running.runner import RunOptions, run_stage
 from pipelines.stages.index import STAGE, IndexConfig
 from wsm_data.errors import ConfigError, IntegrityError
-from wsm_data.readers.containers import Layout, find_containers
+from wsm_data.readers.interndata.containers import Layout, find_containers
 from wsm_data.readers.manifest import load_dataset
 from wsm_data.schema.dataset import CameraModel
 

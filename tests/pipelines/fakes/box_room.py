@@ -18,7 +18,7 @@ import pyarrow.parquet as pq
 
 from wsm_data.geometry.camera import T_OPENGL_OPENCV, pixel_rays
 from wsm_data.geometry.transform import invert
-from wsm_data.readers.frames import EpisodeFrames
+from wsm_data.readers.interndata.frames import EpisodeFrames
 from wsm_data.schema.camera import Intrinsics
 from wsm_data.schema.dataset import DatasetManifest
 from wsm_data.schema.depth import DepthEncoding

@@ -4,7 +4,7 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from wsm_data.access.materialise import copy_shard, finish_selection, plan_selection
+from wsm_data.access.materialise import copy_shard, finish_selection, lay_out_selection
 from wsm_data.access.release import open_release
 from wsm_data.access.verify import verify_release
 from wsm_data.errors import IntegrityError
@@ -31,10 +31,10 @@ def materialise(tiny, tmp_path):
         release = open_release(tiny.folder)
         release = replace(release, manifest=replace(release.manifest, **changes))
         selection = choose(release, rows)
-        plans = plan_selection(release, selection, shard_bytes)
-        shards = [copy_shard(tmp_path / folder / plan.name, plan, release) for plan in plans]
+        layouts = lay_out_selection(release, selection, shard_bytes)
+        shards = [copy_shard(tmp_path / folder / layout.name, layout, release) for layout in layouts]
         finish_selection(
-            tmp_path / folder, release, selection, plans=plans, shards=shards, fingerprints={"selection": "5e1ec7"}
+            tmp_path / folder, release, selection, layouts=layouts, shards=shards, fingerprints={"selection": "5e1ec7"}
         )
         return tmp_path / folder
 

@@ -17,7 +17,7 @@ from wsm_data.shards.assemble import ReleaseFacts, finish_release
 from wsm_data.shards.fragment import build_fragment, fragment_path, read_fragment_info, write_fragment
 from wsm_data.shards.inventory import InventoryRow, UnitState
 from wsm_data.shards.manifest import ReleaseManifest
-from wsm_data.shards.plan import PlannedClip, plan_shards
+from wsm_data.shards.shard_layout import PlacedClip, lay_out_shards
 from wsm_data.shards.writer import write_shard
 
 CODEC = CodecInfo(name="dct", digest="c0dec", channels=48, settings={"quality": [1, 2.5]})
@@ -123,18 +123,18 @@ def pack(folder: Path, clips: Sequence[Clip], *, shard_bytes: int, **changes: ob
     """A release of these clips in `folder`; `changes` replace arguments of `finish_release`."""
     fragments = folder.with_name(f"{folder.name}.fragments")
     paths = {clip.meta.key: write_fragment(fragments, build_fragment(clip)) for clip in clips}
-    planned = [
-        PlannedClip(
+    placed = [
+        PlacedClip(
             key=clip.meta.key,
             split="test" if clip.meta.id.text in TEST_UNITS else "train",
             size_bytes=paths[clip.meta.key].stat().st_size,
         )
         for clip in clips
     ]
-    plans = plan_shards(planned, shard_bytes=shard_bytes, seed=0)
+    layouts = lay_out_shards(placed, shard_bytes=shard_bytes, seed=0)
     arguments = {
-        "plans": plans,
-        "shards": [write_shard(folder / plan.name, plan, lambda key: paths[key]) for plan in plans],
+        "layouts": layouts,
+        "shards": [write_shard(folder / layout.name, layout, lambda key: paths[key]) for layout in layouts],
         "read_info": lambda key: read_fragment_info(fragment_path(fragments, key)),
         "inventory": _inventory(clips),
         "refusals": REFUSED,

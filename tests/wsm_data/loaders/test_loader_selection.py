@@ -4,7 +4,7 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from wsm_data.access.materialise import copy_shard, finish_selection, plan_selection
+from wsm_data.access.materialise import copy_shard, finish_selection, lay_out_selection
 from wsm_data.access.release import open_release
 from wsm_data.curation.diversity import DiversityConfig
 from wsm_data.curation.rule import RuleConfig
@@ -76,9 +76,9 @@ def test_a_selection_may_lie_anywhere(tiny, selection, tmp_path):
 
 def test_the_selection_as_a_release_of_its_own_delivers_the_same_numbers(tiny, selection, tmp_path):
     release = open_release(tiny.folder)
-    plans = plan_selection(release, selection, 1 << 30)
-    shards = [copy_shard(tmp_path / "own" / plan.name, plan, release) for plan in plans]
-    finish_selection(tmp_path / "own", release, selection, plans=plans, shards=shards, fingerprints={})
+    layouts = lay_out_selection(release, selection, 1 << 30)
+    shards = [copy_shard(tmp_path / "own" / layout.name, layout, release) for layout in layouts]
+    finish_selection(tmp_path / "own", release, selection, layouts=layouts, shards=shards, fingerprints={})
     by_name, own = epoch_of(tiny.folder, selection="hard"), epoch_of(tmp_path / "own")
     assert by_name.keys() == own.keys()
     for key, latents in own.items():

@@ -14,8 +14,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from wsm_data.readers.containers import Container, find_containers
-from wsm_data.readers.scan import ContainerScan, scan_container
+from wsm_data.readers.interndata.containers import Container, find_containers
+from wsm_data.readers.interndata.scan import ContainerScan, scan_container
 from wsm_data.schema.dataset import DatasetManifest
 from wsm_data.schema.depth import DepthEncoding
 

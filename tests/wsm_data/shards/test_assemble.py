@@ -96,7 +96,7 @@ def test_a_kill_before_the_end_leaves_no_manifest(tiny: SimpleNamespace, monkeyp
 
 def test_a_shard_that_is_missing_or_of_another_size_is_refused(tiny: SimpleNamespace, tmp_path: Path) -> None:
     wrong = [replace(shard, bytes=shard.bytes + 512) for shard in tiny.manifest.shards]
-    with pytest.raises(IntegrityError, match=r"test-000000\.tar must be the planned shard"):
+    with pytest.raises(IntegrityError, match=r"test-000000\.tar must be the shard of"):
         tiny.pack(tmp_path / "again", tiny.clips, shard_bytes=200_000, shards=wrong)
 
 

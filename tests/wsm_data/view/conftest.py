@@ -31,8 +31,8 @@ from wsm_data.shards.assemble import ReleaseFacts, finish_release
 from wsm_data.shards.fragment import build_fragment, fragment_path, read_fragment_info, write_fragment
 from wsm_data.shards.inventory import InventoryRow, UnitState
 from wsm_data.shards.manifest import release_digest
-from wsm_data.shards.plan import PlannedClip, plan_shards
 from wsm_data.shards.selection import Selection, selection_path, write_selection
+from wsm_data.shards.shard_layout import PlacedClip, lay_out_shards
 from wsm_data.shards.writer import write_shard
 from wsm_data.view.selection.survey import SelectionSurvey, SelectionSurveyConfig, survey_selection
 
@@ -152,15 +152,15 @@ def build_release(folder: Path, units: Mapping[str, str], refusals=REFUSALS, **f
     fragments = [build_fragment(build_clip(unit, notes=("cloud.missing",))) for unit in units]
     for fragment in fragments:
         write_fragment(folder / "fragments", fragment)
-    planned = [
-        PlannedClip(key=fragment.info.key, split=split, size_bytes=fragment.info.size_bytes)
+    placed = [
+        PlacedClip(key=fragment.info.key, split=split, size_bytes=fragment.info.size_bytes)
         for fragment, split in zip(fragments, units.values(), strict=True)
     ]
 
     def place(key: str) -> Path:
         return fragment_path(folder / "fragments", key)
 
-    plans = plan_shards(planned)
+    layouts = lay_out_shards(placed)
     stated = {"name": "small <i>homes</i>", "licences": {"synthetic": "CC0-1.0"}, "fingerprints": {"encode": "ab12"}}
     finish_release(
         folder / "release",
@@ -171,8 +171,8 @@ def build_release(folder: Path, units: Mapping[str, str], refusals=REFUSALS, **f
             encoded_height_px=HEIGHT_PX,
             **(stated | facts),
         ),
-        plans=plans,
-        shards=[write_shard(folder / "release" / plan.name, plan, place) for plan in plans],
+        layouts=layouts,
+        shards=[write_shard(folder / "release" / layout.name, layout, place) for layout in layouts],
         read_info=lambda key: read_fragment_info(place(key)),
         inventory=[
             *(

@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from wsm_data.errors import DataError, Reason
-from wsm_data.readers.containers import CONTENT_FOLDERS, SCENE_CLOUD, Container, Layout, is_unfinished
-from wsm_data.readers.tar_walk import Member, walk_tar
+from wsm_data.readers.archive.tar_walk import Member, walk_tar
+from wsm_data.readers.interndata.containers import CONTENT_FOLDERS, SCENE_CLOUD, Container, Layout, is_unfinished
 from wsm_data.readers.unreadable import read_file, refusing_unreadable
 
 _READ_FOLDER = re.compile(r"data|meta|videos|(data|videos)/[^/]+|videos/[^/]+/observation\.images\.(rgb|depth)")

@@ -1,7 +1,7 @@
 import pytest
 
-from wsm_data.readers.episode_meta import read_image_spans, read_lengths
-from wsm_data.readers.naming import ImageSpan
+from wsm_data.readers.interndata.episode_meta import read_image_spans, read_lengths
+from wsm_data.readers.interndata.naming import ImageSpan
 
 
 def test_lengths_are_found_by_episode_index_or_by_line():

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wsm_data.errors import DataError, Reason
-from wsm_data.readers.tar_header import parse_header, parse_pax
+from wsm_data.readers.archive.tar_header import parse_header, parse_pax
 
 
 @given(size=st.integers(0, 8**11 - 1), name=st.text("abc/._-09", min_size=1, max_size=100))

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wsm_data.readers.path_points import without_path
+from wsm_data.readers.interndata.path_points import without_path
 from wsm_data.schema.dataset import CloudColours
 from wsm_data.schema.point_cloud import PointCloud
 

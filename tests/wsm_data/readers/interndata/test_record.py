@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from wsm_data.errors import DataError, Reason
-from wsm_data.readers.assemble import build_record, digest_frames, episode_numbers
-from wsm_data.readers.contents import FolderContents, ImageFacts
-from wsm_data.readers.table import EpisodeTable
+from wsm_data.readers.interndata.contents import FolderContents, ImageFacts
+from wsm_data.readers.interndata.record import build_record, digest_frames, episode_numbers
+from wsm_data.readers.interndata.table import EpisodeTable
 from wsm_data.schema.dataset import DatasetManifest
 from wsm_data.schema.depth import DepthEncoding
 from wsm_data.schema.identity import EpisodeId

@@ -7,7 +7,7 @@ content turns out to be needed, the episode is refused for the lack of it.
 import json
 from collections.abc import Iterator
 
-from wsm_data.readers.naming import ImageSpan
+from wsm_data.readers.interndata.naming import ImageSpan
 
 
 def read_lengths(data: memoryview) -> dict[int, int]:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from zlib_ng import zlib_ng
 
 from wsm_data.errors import DataError, Reason
-from wsm_data.readers.gzip_stream import open_gzip
+from wsm_data.readers.archive.gzip_stream import open_gzip
 
 CONTENT = np.arange(750_000, dtype=">u4").tobytes()
 

@@ -3,7 +3,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wsm_data.errors import DataError, Reason
-from wsm_data.readers.naming import ImageSpan, Kind, Role, episode_name, frame_numbers, role_of, scene_offset
+from wsm_data.readers.interndata.naming import ImageSpan, Kind, Role, episode_name, frame_numbers, role_of, scene_offset
 
 RGB, DEPTH = "videos/chunk-002/observation.images.rgb", "videos/chunk-002/observation.images.depth"
 

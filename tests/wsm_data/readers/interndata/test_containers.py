@@ -4,7 +4,7 @@ import os
 import pytest
 
 from wsm_data.errors import ConfigError
-from wsm_data.readers.containers import Layout, find_containers
+from wsm_data.readers.interndata.containers import Layout, find_containers
 
 
 def refuse_listing(monkeypatch, name):

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from wsm_data.errors import DataError, Reason
-from wsm_data.readers.assemble import build_record, episode_numbers
-from wsm_data.readers.containers import Container, Layout
-from wsm_data.readers.contents import Contents, FolderContents, FrameKey, read_contents
-from wsm_data.readers.naming import episode_name
-from wsm_data.readers.path_points import without_path
+from wsm_data.readers.interndata.containers import Container, Layout
+from wsm_data.readers.interndata.contents import Contents, FolderContents, FrameKey, read_contents
+from wsm_data.readers.interndata.naming import episode_name
+from wsm_data.readers.interndata.path_points import without_path
+from wsm_data.readers.interndata.record import build_record, episode_numbers
 from wsm_data.schema.dataset import CloudColours, DatasetManifest
 from wsm_data.schema.episode import EpisodeRecord
 from wsm_data.schema.identity import EpisodeId

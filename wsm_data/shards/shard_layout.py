@@ -12,7 +12,7 @@ DEFAULT_SHARD_BYTES = 512 << 20
 
 
 @dataclass(frozen=True, kw_only=True)
-class PlannedClip:
+class PlacedClip:
     """A clip that is to be packed.
 
     Attributes:
@@ -27,7 +27,7 @@ class PlannedClip:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ShardPlan:
+class ShardLayout:
     """The clips of one shard, in the order in which they are stored.
 
     Attributes:
@@ -38,7 +38,7 @@ class ShardPlan:
 
     name: str
     split: str
-    clips: tuple[PlannedClip, ...]
+    clips: tuple[PlacedClip, ...]
 
     @property
     def size_bytes(self) -> int:
@@ -46,9 +46,9 @@ class ShardPlan:
         return sum(clip.size_bytes for clip in self.clips) + len(END_OF_ARCHIVE)
 
 
-def plan_shards(
-    clips: Iterable[PlannedClip], *, shard_bytes: int = DEFAULT_SHARD_BYTES, seed: int = 0
-) -> tuple[ShardPlan, ...]:
+def lay_out_shards(
+    clips: Iterable[PlacedClip], *, shard_bytes: int = DEFAULT_SHARD_BYTES, seed: int = 0
+) -> tuple[ShardLayout, ...]:
     """Fill shards of at most `shard_bytes` with the clips of each split, in the order of sha256(seed, key).
 
     That order mixes scenes, does not depend on the order of the input, and leaves the relative order of all other clips
@@ -59,28 +59,29 @@ def plan_shards(
     """
     ordered = sorted(clips, key=lambda clip: (clip.split, _rank(seed, clip.key), clip.key))
     _require_unique(ordered)
-    plans: list[ShardPlan] = []
+    layouts: list[ShardLayout] = []
     for split in sorted({clip.split for clip in ordered}):
         bins = _fill([clip for clip in ordered if clip.split == split], shard_bytes)
-        plans += [
-            ShardPlan(name=shard_name(split, number), split=split, clips=content) for number, content in enumerate(bins)
+        layouts += [
+            ShardLayout(name=shard_name(split, number), split=split, clips=content)
+            for number, content in enumerate(bins)
         ]
-    return tuple(plans)
+    return tuple(layouts)
 
 
 def _rank(seed: int, key: str) -> bytes:
     return hashlib.sha256(f"{seed}\n{key}".encode()).digest()
 
 
-def _require_unique(clips: Sequence[PlannedClip]) -> None:
+def _require_unique(clips: Sequence[PlacedClip]) -> None:
     keys = sorted(clip.key for clip in clips)
     for first, second in pairwise(keys):
         if first == second:
-            raise ValueError(f"a clip must be planned once, found {first!r} twice")
+            raise ValueError(f"a clip must be placed once, found {first!r} twice")
 
 
-def _fill(clips: Sequence[PlannedClip], shard_bytes: int) -> Iterator[tuple[PlannedClip, ...]]:
-    content: list[PlannedClip] = []
+def _fill(clips: Sequence[PlacedClip], shard_bytes: int) -> Iterator[tuple[PlacedClip, ...]]:
+    content: list[PlacedClip] = []
     size = len(END_OF_ARCHIVE)
     for clip in clips:
         if content and size + clip.size_bytes > shard_bytes:

@@ -6,7 +6,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from wsm_data.errors import DataError, Reason
-from wsm_data.readers.table import INTRINSIC_COLUMN, MOUNT_COLUMN, POSE_COLUMN, read_table
+from wsm_data.readers.interndata.table import INTRINSIC_COLUMN, MOUNT_COLUMN, POSE_COLUMN, read_table
 
 
 def reason_of(data):

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from wsm_data.errors import DataError, Reason
-from wsm_data.readers.gzip_stream import GzipStream, open_gzip
-from wsm_data.readers.tar_header import BLOCK_BYTES, ZERO_BLOCK, TarHeader, long_name, parse_header, parse_pax
+from wsm_data.readers.archive.gzip_stream import GzipStream, open_gzip
+from wsm_data.readers.archive.tar_header import BLOCK_BYTES, ZERO_BLOCK, TarHeader, long_name, parse_header, parse_pax
 
 _MAX_RECORD_BYTES = 1 << 20
 

@@ -7,9 +7,9 @@ import numpy as np
 
 from wsm_data.errors import DataError, Reason
 from wsm_data.geometry.camera import T_STORED_OPENCV
-from wsm_data.readers.contents import FolderContents, FrameKey, ImageFacts
-from wsm_data.readers.naming import frame_numbers, scene_offset
-from wsm_data.readers.table import EpisodeTable
+from wsm_data.readers.interndata.contents import FolderContents, FrameKey, ImageFacts
+from wsm_data.readers.interndata.naming import frame_numbers, scene_offset
+from wsm_data.readers.interndata.table import EpisodeTable
 from wsm_data.schema.arrays import Float64Array
 from wsm_data.schema.camera import Intrinsics
 from wsm_data.schema.dataset import DatasetManifest

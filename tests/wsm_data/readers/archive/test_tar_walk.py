@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wsm_data.errors import DataError, Reason
-from wsm_data.readers.tar_walk import walk_tar
+from wsm_data.readers.archive.tar_walk import walk_tar
 
 FORMATS = {"ustar": tarfile.USTAR_FORMAT, "gnu": tarfile.GNU_FORMAT, "pax": tarfile.PAX_FORMAT}
 FILES = {f"scene/file_{n:02d}": bytes([n]) * (700 * n) for n in range(8)}

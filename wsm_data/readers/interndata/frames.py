@@ -6,9 +6,9 @@ from pathlib import Path
 
 from wsm_data.errors import DataError, IntegrityError
 from wsm_data.files.digest import xxh3_128
-from wsm_data.readers.assemble import digest_frames
-from wsm_data.readers.containers import Container, Layout
-from wsm_data.readers.members import iter_members
+from wsm_data.readers.interndata.containers import Container, Layout
+from wsm_data.readers.interndata.record import digest_frames
+from wsm_data.readers.interndata.scene_files import iter_members
 from wsm_data.readers.unreadable import read_file
 from wsm_data.schema.episode import EpisodeRecord
 

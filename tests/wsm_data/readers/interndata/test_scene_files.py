@@ -4,8 +4,8 @@ import os
 import pytest
 
 from wsm_data.errors import DataError, Reason
-from wsm_data.readers.containers import find_containers
-from wsm_data.readers.members import iter_members
+from wsm_data.readers.interndata.containers import find_containers
+from wsm_data.readers.interndata.scene_files import iter_members
 
 
 def members_of(source, dataset, wanted=lambda name: True):

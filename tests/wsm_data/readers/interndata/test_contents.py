@@ -1,8 +1,8 @@
 import pytest
 
 from wsm_data.errors import Reason
-from wsm_data.readers.containers import find_containers
-from wsm_data.readers.contents import read_contents
+from wsm_data.readers.interndata.containers import find_containers
+from wsm_data.readers.interndata.contents import read_contents
 
 
 def contents_of(source, dataset, every=2):
