@@ -51,6 +51,11 @@ class Reason(StrEnum):
     INTRINSICS_MISFIT = "intrinsics.misfit"
     MOUNT_MISFIT = "mount.misfit"
 
+    # estimated trajectories that are compared with true ones
+    TRAJECTORY_UNREADABLE = "trajectory.unreadable"
+    TRAJECTORY_UNMATCHED = "trajectory.unmatched"
+    TRAJECTORY_DEGENERATE = "trajectory.degenerate"
+
     # point clouds and maps
     CLOUD_MISSING = "cloud.missing"  # a note when the map is fused from depth instead
     CLOUD_UNREADABLE = "cloud.unreadable"

@@ -10,7 +10,6 @@ from wsm_data.synth.home.sampling import sample_surface
 
 OBSTACLE_RGB = (0, 0, 128)
 PATH_RGB = (0, 0, 0)
-_VERTEX = np.dtype([("xyz", "<f4", 3), ("rgb", "u1", 3)])
 _DARKEST, _BRIGHTEST = 70, 235
 
 
@@ -36,20 +35,3 @@ def with_path(cloud: PointCloud, path_m: Float64Array) -> PointCloud:
         xyz_m=np.concatenate([cloud.xyz_m, path_m.astype(np.float32)]),
         rgb_u8=np.concatenate([cloud.rgb_u8, black]),
     )
-
-
-def ply_bytes(cloud: PointCloud) -> bytes:
-    """The cloud as a binary little-endian PLY file with float x, y, z and uchar red, green, blue."""
-    properties = [f"property float {axis}" for axis in "xyz"]
-    properties += [f"property uchar {channel}" for channel in ("red", "green", "blue")]
-    lines = [
-        "ply",
-        "format binary_little_endian 1.0",
-        f"element vertex {len(cloud.xyz_m)}",
-        *properties,
-        "end_header",
-        "",
-    ]
-    vertices = np.empty(len(cloud.xyz_m), _VERTEX)
-    vertices["xyz"], vertices["rgb"] = cloud.xyz_m, cloud.rgb_u8
-    return "\n".join(lines).encode() + vertices.tobytes()

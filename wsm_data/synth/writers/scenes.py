@@ -7,10 +7,11 @@ the same unpacked, and one folder per trajectory.
 from collections.abc import Iterator
 from pathlib import Path
 
+from wsm_data.codecs.ply import ply_bytes
 from wsm_data.files.atomic import write_bytes
 from wsm_data.synth.config import SynthConfig
 from wsm_data.synth.home.home import home_glb
-from wsm_data.synth.writers.cloud import ply_bytes, with_path
+from wsm_data.synth.writers.cloud import with_path
 from wsm_data.synth.writers.containers import Member, write_archive, write_folder
 from wsm_data.synth.writers.metadata import meta_files
 from wsm_data.synth.writers.recording import SceneRecording, plan_recording, record_frames

@@ -1,12 +1,9 @@
-import io
-
 import numpy as np
 import pytest
-import trimesh
 
 from wsm_data.schema.dataset import CloudColours
 from wsm_data.synth.config import SynthConfig
-from wsm_data.synth.writers.cloud import ply_bytes, scene_cloud, with_path
+from wsm_data.synth.writers.cloud import scene_cloud, with_path
 
 
 @pytest.fixture(scope="module")
@@ -44,12 +41,6 @@ def test_every_floor_square_of_25_mm_holds_points(home, cloud):
     )
     assert counts.min() >= 1
     assert counts.mean() > 1.4
-
-
-def test_the_bytes_are_a_ply_that_others_read(cloud):
-    loaded = trimesh.load(io.BytesIO(ply_bytes(cloud)), file_type="ply")
-    assert (np.asarray(loaded.vertices, np.float32) == cloud.xyz_m).all()
-    assert (np.asarray(loaded.colors)[:, :3] == cloud.rgb_u8).all()
 
 
 def test_a_path_follows_the_unchanged_scene_in_black(cloud):
