@@ -244,9 +244,9 @@ def inspect_release(
 def audit_run(
     ledger: Annotated[Path, typer.Argument(metavar="LEDGER", help="Folder in which a loader recorded its steps.")],
     release: Annotated[
-        list[str] | None,
-        typer.Option("--release", help="Release of the run: every step is compared with the plan. Repeatable."),
-    ] = None,
+        list[str],
+        typer.Option("--release", help="Release of the run: every step is compared with its order. Repeatable."),
+    ],
     selection: Annotated[
         list[str] | None,
         typer.Option("--selection", help="Selection file of the run that is not in its release. Repeatable."),
@@ -256,7 +256,7 @@ def audit_run(
     step: Annotated[int | None, typer.Option("--step", min=0, help="Show what this step brought.")] = None,
 ) -> None:
     """Prove from its ledger that a training run saw each clip once an epoch."""
-    _load("audit_run").audit_run(ledger, release or [], selection or [], clip, epoch, step)
+    _load("audit_run").audit_run(ledger, release, selection or [], clip, epoch, step)
 
 
 @app.command("audit")

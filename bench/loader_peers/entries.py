@@ -15,7 +15,6 @@ class Entry:
         environment: name of its environment; empty for this project's own.
         options: settings of the limits and of our own loader; the modules of the peers hold theirs.
         workers: worker processes where the comparison is that of a DataLoader with two; None: takes no part in it.
-        only_processes: takes part in that comparison alone.
         shuffled: takes part where clips are shuffled.
         as_stored: delivers the arrays as they are stored, so that each can be compared with what was written.
         note: what the page says beside it.
@@ -25,7 +24,6 @@ class Entry:
     environment: str = ""
     options: dict[str, object] = field(default_factory=dict)
     workers: int | None = None
-    only_processes: bool = False
     shuffled: bool = True
     as_stored: bool = True
     note: str = ""
@@ -65,7 +63,6 @@ OURS_AS_STORED = {
     "wsm, verify = never": Entry(module="with_wsm", options={"verify": "never"}, shuffled=False),
 }
 OURS_OTHERWISE = {
-    "wsm, 2 worker processes": Entry(module="with_wsm", workers=2, only_processes=True, note="in place of threads"),
     "wsm, standardised": Entry(
         module="with_wsm",
         options={"standardise": True, "dtype": "float32"},
@@ -86,4 +83,4 @@ def takes_part(name: str, *, shuffle: bool, processes: bool) -> bool:
     entry = ENTRIES[name]
     if processes:
         return entry.workers is not None
-    return not entry.only_processes and (entry.shuffled or not shuffle)
+    return entry.shuffled or not shuffle

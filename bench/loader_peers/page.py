@@ -15,8 +15,8 @@ fill a second. Ratios are taken within a round, and say how much faster `wsm` is
 contestant delivers as stored was compared with what was written. torch has one thread in all of them."""
 
 WORKERS = """\
-Workers are started before the first round and persist. `wsm` without a number of processes is the same loader in the
-training process, with its two threads: what a user has in place of workers."""
+Workers are started before the first round and persist. `wsm` is the same loader in the training process, with its two
+threads: what a user has in place of workers."""
 
 MEMORY = """\
 Growth of resident memory since the imports, the largest seen between batches of an epoch, in one process, not shuffled.

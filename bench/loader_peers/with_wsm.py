@@ -16,7 +16,7 @@ class Opened:
     """A loader whose options are those of `ReadConfig`; latents as stored unless an option asks otherwise."""
 
     def __init__(self, setting: Setting):
-        options = {"standardise": False, "dtype": "float16", "workers": setting.workers, **setting.options}
+        options = {"standardise": False, "dtype": "float16", **setting.options}
         read = ReadConfig(**{**options, "verify": Verify(options.get("verify", ReadConfig.verify))})
         order = OrderConfig(seed=SEED, shuffle=setting.shuffle, global_batch=BATCH, remainder=Remainder.PAD)
         source = SourceConfig(release=str(setting.folder))

@@ -25,7 +25,7 @@ def audit_run(
 
     Args:
         folder: the ledger.
-        releases: paths or URLs of the releases of the run, in any order; empty to audit without them.
+        releases: paths or URLs of the releases of the run, in any order.
         selections: selection files of the run that do not stand in their release.
         clip: key of a clip.
         epoch: epoch of a step.
@@ -37,11 +37,9 @@ def audit_run(
     """
     if (epoch is None) != (step is None) or (clip is not None and step is not None):
         raise ConfigError("ask for one clip by --clip, or for one step by --epoch and --step together")
-    if clip is not None and not releases:
-        raise ConfigError("a ledger records the numbers of clips: to find --clip, give the releases by --release")
     timeline = read_timeline(folder)
-    sources = open_recorded_sources(timeline.identity, releases, selections) if releases else None
-    if clip is not None and sources is not None:
+    sources = open_recorded_sources(timeline.identity, releases, selections)
+    if clip is not None:
         _print_clip(timeline, sources, clip)
     elif epoch is not None and step is not None:
         _print_step(timeline, sources, epoch, step)
@@ -58,7 +56,7 @@ def _print_clip(timeline: Timeline, sources: Sources, key: str) -> None:
     typer.echo(aligned(rows, right=range(4)) if len(rows) > 1 else f"{key} was not delivered at any recorded step")
 
 
-def _print_step(timeline: Timeline, sources: Sources | None, epoch: int, step: int) -> None:
+def _print_step(timeline: Timeline, sources: Sources, epoch: int, step: int) -> None:
     records = {record.epoch: record for record in timeline.epochs}
     stretches = records[epoch].stretches if epoch in records else ()
     found = [stretch for stretch in stretches if stretch.start <= step < stretch.end]
@@ -67,14 +65,13 @@ def _print_step(timeline: Timeline, sources: Sources | None, epoch: int, step: i
         raise ConfigError(
             f"step {step} of epoch {epoch} was not recorded by all ranks; there are epochs {', '.join(spans)}"
         )
-    rows = [("rank", "ref", *(("clip",) if sources else ()))]
+    rows = [("rank", "ref", "clip")]
     for rank, refs in enumerate(found[0].refs(step)):
-        keys = sources.keys(refs) if sources else None
-        rows += [(str(rank), str(ref), *((keys[i],) if keys else ())) for i, ref in enumerate(refs.tolist())]
+        rows += [(str(rank), str(ref), key) for ref, key in zip(refs.tolist(), sources.keys(refs), strict=True)]
     typer.echo(aligned(rows, right=(0, 1)))
 
 
-def _print_audit(timeline: Timeline, sources: Sources | None, folder: Path) -> None:
+def _print_audit(timeline: Timeline, sources: Sources, folder: Path) -> None:
     audits = audit_epochs(timeline, sources)
     typer.echo(_head(timeline) + "\n\n" + _epoch_table(audits) + "\n")
     for again in timeline.again:
@@ -92,7 +89,7 @@ def _print_audit(timeline: Timeline, sources: Sources | None, folder: Path) -> N
         misfits.append("at least one step must have been recorded by all ranks, found none")
     if misfits:
         raise IntegrityError(f"{folder} does not prove an uninterrupted course:\n  " + "\n  ".join(misfits))
-    typer.echo(_verdict(audits, beginning, compared=sources is not None))
+    typer.echo(_verdict(audits, beginning))
 
 
 def _beginning(timeline: Timeline) -> str:
@@ -132,8 +129,6 @@ def _explained(audit: EpochAudit) -> str:
         return "does not fit"
     if not audit.complete:
         return "not complete"
-    if audit.plan is None:
-        return "counts fit"
     parts = (
         ("dropped clips", audit.plan.dropped_clips),
         ("repeated rows", audit.plan.repeated_rows),
@@ -142,12 +137,10 @@ def _explained(audit: EpochAudit) -> str:
     return ", ".join(f"{words}: {count:,}" for words, count in parts if count) or "every clip"
 
 
-def _verdict(audits: Sequence[EpochAudit], beginning: str, *, compared: bool) -> str:
+def _verdict(audits: Sequence[EpochAudit], beginning: str) -> str:
     complete = [audit.epoch for audit in audits if audit.complete]
-    proof = (
-        "every recorded step brought what the plan says"
-        if compared
-        else "the counts are those of the sources; --release compares every step with the plan"
-    )
     since = f" from {beginning} on" if beginning else ""
-    return f"{len(complete)} of {len(audits)} epochs complete, no step missing{since}, none twice: {proof}"
+    return (
+        f"{len(complete)} of {len(audits)} epochs complete, no step missing{since}, none twice: every recorded step "
+        "brought what the plan says"
+    )

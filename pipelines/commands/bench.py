@@ -62,7 +62,6 @@ def bench_loader(
 
 def describe(run: LoaderRun, read: ReadConfig, ranks: int) -> str:
     """The table of a run: rates, and where the time went."""
-    kind = "processes" if read.workers else "threads"
     limit = "one stream from the store" if run.remote else "one thread into one buffer"
     rates = aligned(
         [
@@ -76,7 +75,7 @@ def describe(run: LoaderRun, read: ReadConfig, ranks: int) -> str:
     )
     of_all = readers(read) * run.elapsed_s
     parts = [[text, f"{run.seconds[part]:.2f}", f"{run.seconds[part] / of_all:.0%}"] for part, text in _PARTS.items()]
-    header = [f"time of {readers(read)} {kind if read.workers or read.threads else 'caller'}", "s", "share"]
+    header = [f"time of {readers(read)} {'threads' if read.threads else 'caller'}", "s", "share"]
     waited = run.seconds[Part.WAIT]
     rows = [header, *parts, ["the consumer waited", f"{waited:.2f}", f"{waited / run.elapsed_s:.0%}"]]
     return f"{rates}\n\n{aligned(rows, right=[1, 2])}"
@@ -86,7 +85,7 @@ def _sweep(config: LoaderConfig, batches: int, seconds: float, ranks: int) -> st
     """The same with other numbers of threads, one after the other."""
     rows = [["threads", "clips/s", "MB/s", "first batch, ms"]]
     for threads in SWEPT_THREADS:
-        read = replace(config.read, threads=threads, workers=0)
+        read = replace(config.read, threads=threads)
         run, _ = examine(replace(config, read=read), batches=batches, seconds=seconds, ranks=ranks)
         rows.append(
             [

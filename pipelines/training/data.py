@@ -32,7 +32,7 @@ def training_loader(
             "order.remainder = pad leaves ranks of the last step without rows, and the others would wait for them for "
             "ever; choose drop or repeat"
         )
-    is_pinned = device.type == "cuda" and not config.read.workers  # batches of workers come through shared memory
+    is_pinned = device.type == "cuda"
     read = replace(config.read, device=str(device), pin_memory=is_pinned)
     settings = LoaderConfig(sources=config.sources, order=config.order, read=read, ledger=ledger)
     return ClipLoader(settings, rank=rank, world_size=world_size)

@@ -1,7 +1,7 @@
 """Settings of a loader: what is read, in which order, how it becomes batches, and how it is read.
 
 Order and batches decide what a training run sees, so they are part of the state that a checkpoint keeps. How the bytes
-are read (threads, workers, caches) never changes what is delivered.
+are read (threads, caches) never changes what is delivered.
 """
 
 import math
@@ -117,11 +117,8 @@ class ReadConfig(AccessConfig):
     """How the bytes of a batch get into memory, beside how a store is asked; none of it changes what is delivered.
 
     Attributes:
-        verify: when checksums are compared: `first` time a process reads a clip, `always`, or `never`. Worker processes
-            are started anew for each epoch, and check each clip again in it.
+        verify: when checksums are compared: `first` time a process reads a clip, `always`, or `never`.
         threads: threads that read ahead in the training process; 0: everything in the caller's thread.
-        workers: worker processes in place of threads; every batch is copied between processes then, and nothing is
-            asked of a store in advance.
         prefetch_batches: batches that are read ahead.
         standardise: subtract mean and divide by standard deviation; otherwise latents come as they are stored.
         dtype: dtype of the latents of a batch: `float32`, `bfloat16`, or `float16`.
@@ -131,7 +128,6 @@ class ReadConfig(AccessConfig):
 
     verify: Verify = Verify.FIRST
     threads: int = 2
-    workers: int = 0
     prefetch_batches: int = 2
     standardise: bool = True
     dtype: str = "float32"
@@ -141,7 +137,7 @@ class ReadConfig(AccessConfig):
     def __post_init__(self) -> None:
         super().__post_init__()
         object.__setattr__(self, "verify", Verify(self.verify))  # a word, as files and users spell it
-        for name in ("threads", "workers", "prefetch_batches"):
+        for name in ("threads", "prefetch_batches"):
             if getattr(self, name) < 0:
                 raise ValueError(f"{name} must not be negative, found {getattr(self, name)}")
 

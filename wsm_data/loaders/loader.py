@@ -112,7 +112,7 @@ class ClipLoader(torch.utils.data.IterableDataset[Batch]):
         return state_to_json(replace(self._template, epoch=self._epoch, step=self._step))
 
     def load_state_dict(self, state_dict: Mapping[str, Any]) -> None:
-        """Go on from a place, on as many ranks, threads or workers as there are now.
+        """Go on from a place, on as many ranks or threads as there are now.
 
         Raises:
             ConfigError: the state is of other sources or another order; the message says field by field.
@@ -162,7 +162,7 @@ class ClipLoader(torch.utils.data.IterableDataset[Batch]):
         self._epoch, self._step = self._epoch + 1, 0
 
     def close(self) -> None:
-        """End all threads and processes, close the files and the ledger. A later iterator opens them again.
+        """End all threads, close the files and the ledger. A later iterator opens them again.
 
         What a store is being asked is given up, not waited for.
         """
@@ -253,7 +253,7 @@ class ClipLoader(torch.utils.data.IterableDataset[Batch]):
 
 def _require_fit_for_worker(config: LoaderConfig) -> None:
     """What only the training process can do must not be asked of a worker of somebody else's DataLoader."""
-    asked = {"ledger": config.ledger, "workers": config.read.workers, "pin_memory": config.read.pin_memory}
+    asked = {"ledger": config.ledger, "pin_memory": config.read.pin_memory}
     if any(asked.values()) or config.read.device != "cpu":
         names = [name for name, value in asked.items() if value] + ["device"] * (config.read.device != "cpu")
         raise ConfigError(

@@ -85,7 +85,7 @@ class QueryLoader(torch.utils.data.IterableDataset[QueryBatch]):
         return self._histories.state_dict()
 
     def load_state_dict(self, state_dict: Mapping[str, Any]) -> None:
-        """Go on from a place, on as many ranks, threads or workers as there are now.
+        """Go on from a place, on as many ranks or threads as there are now.
 
         Raises:
             ConfigError: the state is of other sources, other queries, or another order.
@@ -100,7 +100,7 @@ class QueryLoader(torch.utils.data.IterableDataset[QueryBatch]):
         return self._histories.completed(self._maps.with_maps, lambda batch: batch.history)
 
     def close(self) -> None:
-        """End all threads and processes, close the files and the ledger. A later iterator opens them again."""
+        """End all threads, close the files and the ledger. A later iterator opens them again."""
         self._histories.close()
 
     def __enter__(self) -> "QueryLoader":

@@ -12,7 +12,7 @@ import torch
 
 from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.loaders.config import LoaderConfig, OrderConfig, SourceConfig
-from wsm_data.loaders.ledger.files import ledger_files
+from wsm_data.loaders.ledger.timeline import read_timeline
 from wsm_data.loaders.loader import ClipLoader
 from wsm_data.loaders.timing import Part
 
@@ -175,12 +175,10 @@ def test_time_is_counted_to_its_parts(make_loader):
 
 def test_what_is_delivered_is_recorded_in_the_ledger(make_loader, tmp_path):
     loader = make_loader(ledger=str(tmp_path / "ledger"))
-    _refs(loader, 2)
-    _refs(loader)
+    delivered = _refs(loader, 2) + _refs(loader)
     loader.close()
-    files = ledger_files(tmp_path / "ledger")
-    assert len(files) == 1
-    assert next(iter(files.values())).stat().st_size > 26 * 8
+    [epoch] = read_timeline(tmp_path / "ledger").epochs
+    assert [(step, refs.tolist()) for step, (refs,) in epoch.by_step()] == list(enumerate(delivered))
 
 
 def test_a_loader_crosses_to_another_process_with_its_place(make_loader):

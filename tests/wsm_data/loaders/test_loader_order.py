@@ -1,4 +1,4 @@
-"""Ordered ids of clips, compared in order: the same for every number of ranks, workers, threads, and every resume."""
+"""Ordered ids of clips, compared in order: the same for every number of ranks and threads, and every resume."""
 
 import itertools
 from collections.abc import Callable, Sequence
@@ -65,13 +65,6 @@ def test_threads_and_prefetch_change_neither_order_nor_content(make_loader, thre
     assert [_content(batch) for batch in loader] == expected
 
 
-@pytest.mark.parametrize("workers", [1, 2])
-def test_worker_processes_change_neither_order_nor_content(make_loader, workers):
-    expected = [_content(batch) for batch in make_loader(**SHORT, threads=0)]
-    loader = make_loader(**SHORT, workers=workers, prefetch_batches=2)
-    assert [_content(batch) for batch in loader] == expected
-
-
 @pytest.mark.parametrize("settings", [ORDER, PACKED], ids=["repeat", "packed"])
 def test_a_run_resumes_at_every_step_on_any_other_world_size(make_loader, settings):
     states: list[dict[str, object]] = []
@@ -83,25 +76,6 @@ def test_a_run_resumes_at_every_step_on_any_other_world_size(make_loader, settin
         for loader in loaders:
             loader.load_state_dict(state)
         assert _run(loaders)[: len(expected) - number] == expected[number:]
-
-
-@pytest.mark.parametrize(("workers", "world_sizes"), [(1, (2, 3, 2)), (2, (3, 2, 3))])
-def test_workers_resume_on_other_world_sizes_in_the_same_order(make_loader, workers, world_sizes):
-    """A step each on two world sizes, then the rest of two epochs on another; all combinations are in the slow test."""
-    expected = _run(_ranks(make_loader, 1, SHORT | {"threads": 0}))
-    found: list[list[int]] = []
-    state = make_loader(**SHORT).state_dict()
-    for number, world_size in enumerate(world_sizes):
-        loaders = _ranks(make_loader, world_size, SHORT | {"workers": workers})
-        for loader in loaders:
-            loader.load_state_dict(state)
-        if number == len(world_sizes) - 1:
-            found += _run(loaders)
-        else:
-            batches = [next(iter(loader)) for loader in loaders]
-            found.append([ref for batch in batches for ref in batch.refs.tolist()])
-            state = loaders[0].state_dict()
-    assert found == expected
 
 
 def test_an_interrupted_epoch_goes_on_with_fewer_ranks_and_again_with_more(make_loader):
@@ -123,15 +97,14 @@ def test_an_interrupted_epoch_goes_on_with_fewer_ranks_and_again_with_more(make_
 
 @pytest.mark.slow
 @pytest.mark.parametrize("settings", [ORDER, PACKED | {"global_batch": 12}], ids=["repeat", "packed"])
-@pytest.mark.parametrize("workers", [0, 1, 2])
 @pytest.mark.parametrize("threads", [1, 4])
 @pytest.mark.parametrize("world_size", WORLD_SIZES)
-def test_all_combinations_resumed_at_every_step(make_loader, settings, workers, threads, world_size):
+def test_all_combinations_resumed_at_every_step(make_loader, settings, threads, world_size):
     """Also on the next world size: the state of one is loaded by the other."""
     states: list[dict[str, object]] = []
     expected = _run(_ranks(make_loader, 1, settings | {"threads": 0}), states)
     following = WORLD_SIZES[(WORLD_SIZES.index(world_size) + 1) % len(WORLD_SIZES)]
-    reading = {"workers": workers, "threads": threads}
+    reading = {"threads": threads}
     assert _run(_ranks(make_loader, world_size, settings | reading)) == expected
     for number in range(len(expected)):
         state = states[number + number // (len(expected) // EPOCHS)]

@@ -145,11 +145,5 @@ def test_a_second_epoch_from_the_cache_asks_for_no_shard(epoch, expected, remote
     assert len(remote.proxy.requests(r"\.tar")) == before
 
 
-@pytest.mark.slow
-@BOTH
-def test_worker_processes_change_nothing(epoch, expected, access):
-    assert epoch([], access=access, workers=2) == expected
-
-
 def test_the_steps_differ_so_that_an_order_can_be_seen(expected):
     assert len(set(expected)) == len(expected) == STEPS

@@ -191,7 +191,7 @@ def damage_map(release, query):
     return row
 
 
-@pytest.mark.parametrize("reading", [{"threads": 0}, {"threads": 2, "prefetch_batches": 4}, {"workers": 1}], ids=str)
+@pytest.mark.parametrize("reading", [{"threads": 0}, {"threads": 2, "prefetch_batches": 4}], ids=str)
 def test_a_step_whose_map_is_damaged_is_neither_counted_nor_recorded(driven, tmp_path, reading):
     """Two queries a clip and two a step: in the order of the index, step 3 has the fourth clip."""
     release, _ = driven

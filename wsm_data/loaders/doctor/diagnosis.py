@@ -13,9 +13,6 @@ KEEPS_UP_SHARE = 0.05
 AT_THE_LIMIT_SHARE = 0.8
 """A local store that gives this share of what one thread reads of the same bytes afterwards is as fast as it gets."""
 
-UNEXPLAINED_SHARE = 0.5
-"""Worker processes that account for less than this share of their time spend the rest handing over batches."""
-
 IDLE_SHARE = 0.2
 """Where no part takes this share of the readers' time, they have nothing to do."""
 
@@ -32,7 +29,7 @@ class LoaderRun:
         stored_bytes: bytes that these clips take in their shards.
         elapsed_s: time that passed, s.
         first_batch_s: time from opening the loader to its first batch, s.
-        seconds: time by part, added up over all threads or processes, s.
+        seconds: time by part, added up over all threads, s.
         step_s: time that the consumer took for each batch, s; 0: it only took batches.
         limit_bytes_per_s: rate at which the bytes of the same clips were read again afterwards, one clip after the
             other into one buffer.
@@ -52,11 +49,6 @@ class LoaderRun:
     def bytes_per_s(self) -> float:
         """Stored bytes delivered in a second."""
         return self.stored_bytes / self.elapsed_s
-
-    @property
-    def store_bytes_per_s(self) -> float:
-        """Bytes that the store gave in a second of one thread's reading."""
-        return self.stored_bytes / max(self.seconds[Part.STORE], 1e-9)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,8 +71,8 @@ class SourceFacts:
 
 
 def readers(read: ReadConfig) -> int:
-    """Threads or processes that read at the same time."""
-    return max(1, read.workers or read.threads)
+    """Threads that read at the same time."""
+    return max(1, read.threads)
 
 
 def diagnose(run: LoaderRun, read: ReadConfig) -> str:
@@ -98,11 +90,6 @@ def diagnose(run: LoaderRun, read: ReadConfig) -> str:
         )
     work = {part: seconds for part, seconds in run.seconds.items() if part is not Part.WAIT}
     busy_share = sum(work.values()) / (readers(read) * run.elapsed_s)
-    if read.workers and busy_share < UNEXPLAINED_SHARE:
-        return (
-            f"Handing batches over between processes takes the time: the {read.workers} worker processes spend "
-            f"{busy_share:.0%} of it on the batches themselves; set read.workers=0 and read with threads."
-        )
     part = max(work, key=lambda one: work[one])
     share = work[part] / (readers(read) * run.elapsed_s)
     if not run.step_s and share < IDLE_SHARE and read.threads:
@@ -168,8 +155,6 @@ def _of_transfer(_: LoaderRun, read: ReadConfig, share: float) -> str:
 
 
 def _more(read: ReadConfig) -> str:
-    if read.workers:
-        return f"read.workers above {read.workers}"
     return f"read.threads above {read.threads}"
 
 

@@ -1,21 +1,16 @@
 """The proof that a run saw each clip as often as its plan says, from the ledger its ranks wrote.
 
-With the releases at hand every recorded step is compared with the plan, computed anew: the strongest proof. Without
-them the counts of an epoch are held against what any order of such sources must have.
+The plan is computed anew from the releases of the run, and every recorded step is compared with it, rank by rank.
 """
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
-from wsm_data.loaders.config import Arrangement, OrderConfig, Remainder
 from wsm_data.loaders.ledger.sources import recorded_order
 from wsm_data.loaders.ledger.timeline import EpochRecord, Timeline
 from wsm_data.loaders.order.epoch_plan import EpochPlan, PlanReport
-from wsm_data.loaders.order.mixing import stretch_of_epoch
-from wsm_data.loaders.order.stable_hash import Int64Array
 from wsm_data.loaders.sources.clips import Sources
 
 _SHOWN = 5
@@ -34,7 +29,7 @@ class EpochAudit:
         seen_once: clips that were seen once.
         seen_more: clips that were seen more often.
         never: clips of the sources that were not seen.
-        plan: what the plan says becomes of the clips; None where it was not computed.
+        plan: what the plan says becomes of the clips.
         misfits: what does not fit, in sentences.
     """
 
@@ -45,7 +40,7 @@ class EpochAudit:
     seen_once: int
     seen_more: int
     never: int
-    plan: PlanReport | None
+    plan: PlanReport
     misfits: tuple[str, ...] = field(default=())
 
     @property
@@ -75,16 +70,15 @@ class Sighting:
     counts: bool
 
 
-def audit_epochs(timeline: Timeline, sources: Sources | None) -> tuple[EpochAudit, ...]:
+def audit_epochs(timeline: Timeline, sources: Sources) -> tuple[EpochAudit, ...]:
     """Audit every epoch of a ledger.
 
     Args:
         timeline: the ledger.
-        sources: the sources of the run (`open_recorded_sources`), for the comparison with the plan; None for the
-            counts alone.
+        sources: the sources of the run (`open_recorded_sources`).
     """
     order = recorded_order(timeline.identity)
-    return tuple(_audit_epoch(record, timeline.identity["sources"], order, sources) for record in timeline.epochs)
+    return tuple(_audit_epoch(record, sources.plan(order, record.epoch), sources.clips) for record in timeline.epochs)
 
 
 def sightings(timeline: Timeline, refs: Sequence[int]) -> Iterator[Sighting]:
@@ -110,17 +104,13 @@ def sightings(timeline: Timeline, refs: Sequence[int]) -> Iterator[Sighting]:
                     )
 
 
-def _audit_epoch(
-    record: EpochRecord, stated: Sequence[dict[str, Any]], order: OrderConfig, sources: Sources | None
-) -> EpochAudit:
-    plan = sources.plan(order, record.epoch) if sources is not None else None
-    clips = sum(source["clips"] for source in stated)
+def _audit_epoch(record: EpochRecord, plan: EpochPlan, clips: int) -> EpochAudit:
     given = [np.concatenate(refs) for _, refs in record.by_step()]
     refs = np.concatenate([np.empty(0, np.int64), *given])
     unknown = (refs < 0) | (refs >= clips)
     times = np.bincount(refs[~unknown], minlength=clips)
     misfits = [f"{int(unknown.sum())} refs are none of the {clips} clips of the sources"] if unknown.any() else []
-    misfits += _against_plan(record, plan) if plan is not None else _against_counts(record, stated, order, times)
+    misfits += _against_plan(record, plan)
     return EpochAudit(
         epoch=record.epoch,
         steps=record.steps,
@@ -129,13 +119,9 @@ def _audit_epoch(
         seen_once=int((times == 1).sum()),
         seen_more=int((times > 1).sum()),
         never=int((times == 0).sum()),
-        plan=plan.report if plan is not None else None,
+        plan=plan.report,
         misfits=tuple(f"epoch {record.epoch}: {misfit}" for misfit in misfits),
     )
-
-
-def _stretch(source: dict[str, Any], epoch: int) -> tuple[int, int]:
-    return stretch_of_epoch(source["clips"], source["weight"], epoch)
 
 
 def _against_plan(record: EpochRecord, plan: EpochPlan) -> list[str]:
@@ -153,46 +139,6 @@ def _against_plan(record: EpochRecord, plan: EpochPlan) -> list[str]:
                         f"found {given.tolist()}"
                     )
     return _first(misfits)
-
-
-def _against_counts(
-    record: EpochRecord, stated: Sequence[dict[str, Any]], order: OrderConfig, times: Int64Array
-) -> list[str]:
-    """What any order of such sources must have: no clip too often, and none missing but for the remainder."""
-    most, base = np.empty(len(times), np.int64), 0
-    least = np.empty(len(times), np.int64)
-    for source in stated:
-        clips = source["clips"]
-        first, last = _stretch(source, record.epoch)
-        own = slice(base, base + clips)
-        most[own] = -(-last // clips) - first // clips  # each pass that the epoch touches brings a clip once
-        least[own] = max(last // clips + first // -clips, 0)  # each pass that lies in the epoch as a whole
-        base += clips
-    too_often, missing = int(np.maximum(times - most, 0).sum()), int(np.maximum(least - times, 0).sum())
-    misfits = []
-    if too_often and order.remainder is not Remainder.REPEAT:
-        misfits.append(f"{too_often} deliveries are of clips that had been seen as often as their sources give them")
-    if record.recorded == record.steps and missing and order.remainder is not Remainder.DROP:
-        misfits.append(f"{missing} deliveries are missing, though no clip may be left out with {order.remainder}")
-    return misfits + (_against_slots(record, stated, order, int(times.sum())) if not misfits else [])
-
-
-def _against_slots(
-    record: EpochRecord, stated: Sequence[dict[str, Any]], order: OrderConfig, delivered: int
-) -> list[str]:
-    """With one clip a row, the number of steps and of deliveries is known; packed rows hold any number of clips."""
-    if order.arrangement is Arrangement.PACK or record.recorded != record.steps:
-        return []
-    planned = sum(len(range(*_stretch(source, record.epoch))) for source in stated)
-    full, rest = divmod(planned, order.global_batch)
-    steps = full + (rest > 0 and order.remainder is not Remainder.DROP)
-    wanted = planned if order.remainder is Remainder.PAD else steps * order.global_batch
-    if (record.steps, delivered) == (steps, wanted):
-        return []
-    return [
-        f"{planned} clips in steps of {order.global_batch} make {steps} steps with {wanted} deliveries "
-        f"({order.remainder}), found {record.steps} with {delivered}"
-    ]
 
 
 def _first(misfits: list[str]) -> list[str]:

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
-from functools import partial
 from itertools import chain, islice, repeat
 from typing import Generic, TypeVar
 
@@ -12,7 +11,6 @@ from wsm_data.loaders.config import ReadConfig
 from wsm_data.loaders.order.epoch_plan import EpochPlan
 from wsm_data.loaders.reading.prefetch import Prefetch, Work, done_alone
 from wsm_data.loaders.reading.step_reader import StepReader, StepWork
-from wsm_data.loaders.reading.worker_processes import StepDataset, read_in_processes
 from wsm_data.loaders.timing import Part, Stopwatch, Timing
 
 Delivered = TypeVar("Delivered")
@@ -52,8 +50,6 @@ def open_stream(
     def begin(step: int) -> _BatchWork[Delivered]:
         return _BatchWork(reader.begin(plan, step), transfer, timing)
 
-    if read.workers and not inline:
-        return _by_processes(StepDataset(reader, plan), steps, read, partial(_finished, transfer, timing))
     if read.threads and not inline:
         return Prefetch(iter(steps), begin, announce, threads=read.threads, depth=read.prefetch_batches)
     return _one_by_one(steps, begin, announce)
@@ -108,10 +104,3 @@ def _one_by_one(
     for step in steps:
         announce(step)
         yield done_alone(begin(step))
-
-
-def _by_processes(
-    dataset: StepDataset, steps: Sequence[int], read: ReadConfig, finished: Callable[[PackedBatch], Delivered]
-) -> Generator[Delivered, None, None]:
-    for packed in read_in_processes(dataset, steps, read):
-        yield finished(packed)

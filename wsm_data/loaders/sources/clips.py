@@ -4,16 +4,13 @@ The number of a clip over all sources, its *ref*, is the base of its source plus
 has the clips in the order of the index.
 """
 
-import logging
 from bisect import bisect_right
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import chain
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
 
 from wsm_data.access.release import Release, open_release
 from wsm_data.errors import ConfigError
@@ -24,11 +21,6 @@ from wsm_data.loaders.order.pass_order import SourceLayout
 from wsm_data.loaders.order.stable_hash import Int64Array
 from wsm_data.shards.index_row import IndexRow
 from wsm_data.shards.selection import read_selection
-
-_LOG = logging.getLogger(__name__)
-
-_COMPARED_AT_ONCE = 1 << 20
-"""Clips of two sources whose texts are held at the same time, to be compared."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -118,12 +110,10 @@ class Sources:
     """All sources of a loader.
 
     Attributes:
-        tables: the sources, in the order of the settings.
-        duplicates: clips that are reached through more than one source.
+        tables: the sources, in the order of the settings. A clip that two of them have comes once for each.
     """
 
     tables: tuple[SourceTable, ...]
-    duplicates: int
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Cross to another process as settings: files stay here, and are opened again there."""
@@ -195,7 +185,7 @@ def open_sources(configs: Sequence[SourceConfig]) -> Sources:
         base = tables[-1].base + len(tables[-1]) if tables else 0
         tables.append(_open_source(config, releases[config.release], base))
         _require_alike(tables[0].release, tables[-1].release)
-    return Sources(tuple(tables), count_duplicates(tables))
+    return Sources(tuple(tables))
 
 
 def _open_source(config: SourceConfig, release: Release, base: int) -> SourceTable:
@@ -233,72 +223,6 @@ def _require_alike(first: Release, other: Release) -> None:
             f"the sources of a loader must have images of one size: {first.store.root} has {sizes[0]}, "
             f"{other.store.root} has {sizes[1]} (width and height, px); load them apart, or encode one again"
         )
-
-
-def count_duplicates(tables: Sequence[SourceTable]) -> int:
-    """Count the clips that an earlier source has too, by key and digest of their content, and log what was found."""
-    total = 0
-    for number, table in enumerate(tables):
-        for earlier in tables[:number]:
-            count, key = _shared(earlier, table)
-            total += count
-            if count:
-                _LOG.warning(
-                    "%d clips, such as %s, come from source %s and from source %s; an epoch brings them once for each",
-                    count, key, _words(earlier), _words(table),
-                )  # fmt: skip
-    return total
-
-
-def _shared(one: SourceTable, other: SourceTable) -> tuple[int, str]:
-    """How many clips two sources share, and the key of the first in the order of `one`.
-
-    Hashes are compared first, so that of sources of any size only the texts of some clips are held.
-    """
-    if one.release.digest == other.release.digest:
-        rows = np.intersect1d(one.rows, other.rows, assume_unique=True)
-        return len(rows), one.release.index.values(["key"], rows[:1])[0][0] if len(rows) else ""
-    hashes, others = _content_hashes(one), _content_hashes(other)
-    common = np.intersect1d(hashes, others)
-    count, first = 0, len(one)
-    for start in range(0, len(common), _COMPARED_AT_ONCE):
-        wanted = common[start : start + _COMPARED_AT_ONCE]
-        known = set(_contents(other, _numbers_of(others, wanted)))
-        numbers = _numbers_of(hashes, wanted)
-        shared = [n for n, content in zip(numbers.tolist(), _contents(one, numbers), strict=True) if content in known]
-        count, first = count + len(shared), min([first, *shared[:1]])
-    return count, one.keys([first])[0] if count else ""
-
-
-def _content_hashes(table: SourceTable) -> Int64Array:
-    """A number for each clip, the same for the same content within this process; int64 [clips]."""
-    parts = (zip(*(column.to_pylist() for column in part), strict=True) for part in _content_parts(table))
-    return np.fromiter(map(hash, chain.from_iterable(parts)), np.int64, len(table.release.index))[table.rows]
-
-
-def _numbers_of(hashes: Int64Array, wanted: Int64Array) -> Int64Array:
-    """Numbers of the clips, ascending, whose hash is one of `wanted`, which are ascending too."""
-    near = np.flatnonzero((hashes >= wanted[0]) & (hashes <= wanted[-1]))
-    return near[np.isin(hashes[near], wanted)]
-
-
-def _contents(table: SourceTable, numbers: Int64Array) -> Iterator[tuple[str, str]]:
-    """Key and digest of the content of some clips, ascending by number; the index is read part by part."""
-    rows, start = table.rows[numbers], 0
-    for keys, digests in _content_parts(table):
-        first, last = np.searchsorted(rows, (start, start + len(keys)))
-        own = rows[first:last] - start
-        yield from zip(keys.take(own).to_pylist(), digests.take(own).to_pylist(), strict=True)
-        start += len(keys)
-
-
-def _content_parts(table: SourceTable) -> Iterator[tuple[pa.ChunkedArray, pa.ChunkedArray]]:
-    return zip(table.release.index.parts("key"), table.release.index.parts("source_digest"), strict=True)
-
-
-def _words(table: SourceTable) -> str:
-    parts = (table.config.release, table.config.split, table.selection)
-    return " / ".join(part for part in parts if part)
 
 
 def _identity(table: SourceTable) -> dict[str, Any]:

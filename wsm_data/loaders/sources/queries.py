@@ -111,7 +111,7 @@ def open_queries(configs: Sequence[SourceConfig], queries: QueryConfig) -> Query
         tables.append(replace(table, rows=np.repeat(table.rows, counts), base=base))
     if without:
         _LOG.warning("%d of %d clips are too short for a query and are left out", without, clips.clips)
-    return QuerySources(tuple(tables), clips.duplicates, queries)
+    return QuerySources(tuple(tables), queries)
 
 
 def replan_choices(table: SourceTable, queries: QueryConfig) -> Int64Array:

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from wsm_data.access.config import RemoteAccess
 from wsm_data.loaders.config import Arrangement, OrderConfig, ReadConfig, Verify
-from wsm_data.loaders.doctor.diagnosis import LoaderRun, SourceFacts, cautions, diagnose, readers
+from wsm_data.loaders.doctor.diagnosis import LoaderRun, SourceFacts, cautions, diagnose
 from wsm_data.loaders.timing import Part
 
 ELAPSED_S = 10.0
@@ -81,12 +81,6 @@ CASES = {
         ReadConfig(device="cuda", pin_memory=True),
         ["Copying to cuda takes 50%", "bound by the bus"],
     ),
-    "processes": (
-        run(store=0.1, collate=0.05),
-        ReadConfig(workers=2),
-        ["Handing batches over between processes", "2 worker processes", "15%", "read.workers=0"],
-    ),
-    "busy processes": (run(store=0.9), ReadConfig(workers=2), ["The store gives", "read.workers above 2"]),
     "no room to read ahead": (
         run(store=0.1, collate=0.05),
         ReadConfig(prefetch_batches=1),
@@ -128,7 +122,6 @@ shares = st.floats(0.0, 1.0)
     read=st.builds(
         ReadConfig,
         threads=st.integers(0, 4),
-        workers=st.integers(0, 2),
         verify=st.sampled_from(Verify),
         access=st.sampled_from(RemoteAccess),
         standardise=st.booleans(),
@@ -137,14 +130,6 @@ shares = st.floats(0.0, 1.0)
 )
 def test_whatever_was_measured_there_is_a_sentence(shares, remote, step_s, read):
     assert diagnose(run(remote=remote, step_s=step_s, **shares), read).endswith(".")
-
-
-@pytest.mark.parametrize(
-    ("read", "expected"),
-    [(ReadConfig(threads=3), 3), (ReadConfig(threads=0), 1), (ReadConfig(threads=3, workers=2), 2)],
-)
-def test_worker_processes_take_the_place_of_threads(read, expected):
-    assert readers(read) == expected
 
 
 def facts(**changes):

@@ -25,7 +25,7 @@ def stream_of(released):
     return make
 
 
-@pytest.mark.parametrize("reading", [{"threads": 0}, {"threads": 2}, {"workers": 1}, {"workers": 1, "inline": True}])
+@pytest.mark.parametrize("reading", [{"threads": 0}, {"threads": 2}, {"threads": 2, "inline": True}])
 def test_the_steps_come_as_asked_and_their_time_is_counted(stream_of, reading):
     timing = Timing()
     assert [batch.step for batch in stream_of([3, 0, 2], timing=timing, **reading)] == [3, 0, 2]

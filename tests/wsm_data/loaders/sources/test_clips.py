@@ -1,7 +1,6 @@
-import logging
 import pickle
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -14,7 +13,6 @@ from wsm_data.access.release import open_release
 from wsm_data.errors import ConfigError
 from wsm_data.loaders.config import OrderConfig, SourceConfig
 from wsm_data.loaders.sources.clips import open_sources
-from wsm_data.schema.clip import Clip
 from wsm_data.shards.manifest import manifest_bytes
 from wsm_data.shards.selection import Selection, selection_path, write_selection
 
@@ -123,54 +121,6 @@ def test_wrong_requests_say_what_there_is(config: SourceConfig, tiny: SimpleName
     select(tiny.folder, open_sources([replace(config, split="test")]).keys([0]))
     with pytest.raises(ConfigError, match=r"must have clips, but .* has none of split train and selection hard"):
         open_sources([replace(config, selection="hard")])
-
-
-def test_a_clip_that_two_sources_have_is_announced(
-    config: SourceConfig, tiny: SimpleNamespace, caplog: pytest.LogCaptureFixture
-) -> None:
-    with caplog.at_level(logging.WARNING):
-        assert open_sources([config, replace(config, split="test")]).duplicates == 0
-        assert not caplog.records
-        assert open_sources([config, replace(config, split="")]).duplicates == 5
-    assert "5 clips, such as synth_" in caplog.text
-    assert "once for each" in caplog.text
-
-
-def test_the_same_clip_in_two_releases_is_announced(
-    config: SourceConfig, tiny: SimpleNamespace, make_clip: Callable[..., Clip], caplog: pytest.LogCaptureFixture
-) -> None:
-    """Two of the clips are the same in both; one has the same key, but other content."""
-    first, second, third, *_ = tiny.clips
-    changed = make_clip(third.meta.id.text, latents=third.latent_count, source_digest="another")
-    other = tiny.folder.with_name("other")
-    tiny.pack(other, [first, second, changed], shard_bytes=200_000)
-    assert open_sources([config, SourceConfig(release=str(other))]).duplicates == 2
-    assert first.meta.key in caplog.text or second.meta.key in caplog.text
-
-
-@pytest.mark.parametrize("at_once", [1, 2, 1 << 20])
-@pytest.mark.parametrize("hashes", [1, 2, 1 << 62], ids=["all collide", "many collide", "none collides"])
-def test_clips_are_the_same_by_key_and_content_whatever_their_hashes(
-    tiny: SimpleNamespace,
-    make_clip: Callable[..., Clip],
-    caplog: pytest.LogCaptureFixture,
-    monkeypatch: pytest.MonkeyPatch,
-    at_once: int,
-    hashes: int,
-) -> None:
-    monkeypatch.setattr("wsm_data.loaders.sources.clips._COMPARED_AT_ONCE", at_once)
-    monkeypatch.setattr(
-        "wsm_data.loaders.sources.clips._content_hashes",
-        lambda table: np.array([hash(key) % hashes for key in table.keys(range(len(table)))], np.int64),
-    )
-    changed = [make_clip(clip.meta.id.text, latents=3, source_digest="another") for clip in tiny.clips[4:6]]
-    tiny.pack(tiny.folder.with_name("other"), [*tiny.clips[1:4], *changed], shard_bytes=200_000)
-    configs = [SourceConfig(release=str(folder), split="") for folder in (tiny.folder, tiny.folder.with_name("other"))]
-    first, second = (open_release(config.release).index.columns(["key", "source_digest"]) for config in configs)
-    shared = [row["key"] for row in first.to_pylist() if row in second.to_pylist()]
-    assert len(shared) == 3
-    assert open_sources(configs).duplicates == 3
-    assert f"3 clips, such as {shared[0]}, come from" in caplog.text
 
 
 def test_sources_of_other_codecs_or_image_sizes_are_not_mixed(config: SourceConfig, tiny: SimpleNamespace) -> None:
