@@ -95,10 +95,9 @@ class CachedShards:
                 self._announced.add(span, None)
             self._changed.notify_all()
 
-    def forget(self, shard: str) -> bool:
+    def forget(self, shard: str) -> None:
         """Remove the shard from the cache: the next reading downloads it again."""
         self._cache.remove(self._shards[shard])
-        return True
 
     def close(self) -> None:
         """Give up what is being downloaded, and end the threads."""

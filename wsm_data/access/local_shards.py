@@ -39,11 +39,10 @@ class LocalShards:
     def expect(self, spans: Sequence[Span]) -> None:
         """Nothing: the system reads ahead."""
 
-    def forget(self, shard: str) -> bool:
-        """Close the shard; the disk would give the same bytes again."""
+    def forget(self, shard: str) -> None:
+        """Close the shard: the next reading opens what has its name then."""
         with self._lock:
             self._files.pop(shard, None)
-        return False
 
     def close(self) -> None:
         """Close all files that no thread is reading, and the others when it is done."""

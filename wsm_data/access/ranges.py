@@ -139,10 +139,8 @@ class RangeReader:
             self._give_up_abandoned()
             self._begin()
 
-    def forget(self, shard: str) -> bool:
-        """Nothing of a shard is kept once it was read: the next reading asks the store."""
-        del shard
-        return True
+    def forget(self, shard: str) -> None:
+        """Nothing: of what was read nothing is kept, the next reading asks the store."""
 
     def close(self) -> None:
         """Give up what is being fetched, and end the threads."""

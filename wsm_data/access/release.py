@@ -9,12 +9,16 @@ from pathlib import Path
 
 import pyarrow as pa
 
+from wsm_data.access.clip_reader import read_members
+from wsm_data.access.config import AccessConfig
+from wsm_data.access.open_shards import open_shards
+from wsm_data.access.shard_reader import ShardReader
 from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.files.digest import sha256_bytes
 from wsm_data.files.stores import LocalStore, Store, open_store
 from wsm_data.schema.clip import Clip
 from wsm_data.schema.codec import CodecInfo
-from wsm_data.shards.clip_bytes import check_members, decode_clip
+from wsm_data.shards.clip_bytes import content_of, decode_clip
 from wsm_data.shards.index import IndexTable
 from wsm_data.shards.index_file import IndexFile, OpenFile, local_file
 from wsm_data.shards.index_row import IndexRow
@@ -43,30 +47,25 @@ class Release:
     index: IndexTable
     digest: str
 
-    def read_clip(self, key: str, verify: bool = True) -> Clip:
+    def read_clip(self, key: str) -> Clip:
         """Read one clip with a single ranged read; its arrays are read-only views of the bytes that were read.
-
-        Args:
-            key: key of the clip.
-            verify: compare the checksum of every member.
 
         Raises:
             ConfigError: the release has no such clip.
-            IntegrityError: names shard, clip and member that are damaged; or the clip's codec is not the release's.
+            IntegrityError: names shard, clip and member that are damaged, and were when they were read again; or the
+                clip's codec is not the release's.
         """
-        return self.read_row(self.index.row(key), verify)
+        return self.read_row(self.index.row(key))
 
-    def read_row(self, row: IndexRow, verify: bool = True) -> Clip:
+    def read_row(self, row: IndexRow) -> Clip:
         """Read the clip of a row of the index, as `read_clip` does.
 
         Raises:
             IntegrityError: as `read_clip`.
         """
         where = f"{row.shard}, clip {row.key}"
-        data = memoryview(self._read(row, where))
-        if verify:
-            check_members(data, row.members, where)
-        clip = decode_clip(data, row.members, where)
+        data, members = read_members(self.shards, row)
+        clip = decode_clip(data, members, where)
         if (clip.meta.key, clip.meta.codec_digest) != (row.key, self.manifest.codec.digest):
             raise IntegrityError(
                 f"{where}: the meta data must be of this clip and codec digest {self.manifest.codec.digest}, found "
@@ -74,18 +73,23 @@ class Release:
             )
         return clip
 
-    def read_clip_bytes(self, key: str) -> bytes:
+    def read_clip_bytes(self, key: str) -> memoryview:
         """Read a clip as it stands in its shard: tar headers, members and padding.
 
         Raises:
             ConfigError: the release has no such clip.
-            IntegrityError: names shard, clip and member that are damaged.
+            IntegrityError: as `read_clip`.
         """
-        row = self.index.row(key)
-        where = f"{row.shard}, clip {key}"
-        data = self._read(row, where)
-        check_members(memoryview(data), row.members, where)
-        return data
+        return read_members(self.shards, self.index.row(key))[0]
+
+    def read_member(self, row: IndexRow, name: str) -> memoryview:
+        """Read what one member of a clip holds, an array or the meta data, without the rest of the clip.
+
+        Raises:
+            IntegrityError: as `read_clip`.
+        """
+        data, [member] = read_members(self.shards, row, (name,))
+        return content_of(data, member)
 
     def require_codec(self, codec: CodecInfo) -> None:
         """Check that latents of this release may be decoded by `codec`, or mixed with others of it.
@@ -112,23 +116,10 @@ class Release:
         data = checked_file(self.store, QUARANTINE_NAME, self.manifest.quarantine_sha256)
         return parse_quarantine(data, f"{self.store.root}/{QUARANTINE_NAME}")
 
-    def _read(self, row: IndexRow, where: str) -> bytes:
-        try:
-            data = self.store.read_range(row.shard, row.clip_offset, row.clip_size)
-        except FileNotFoundError as error:
-            raise IntegrityError(f"{where}: the shard is missing from {self.store.root}; fetch it again") from error
-        except OSError:
-            self._require_long_enough(row, where)  # some stores fail where a range starts behind the end
-            raise
-        if len(data) != row.clip_size:
-            self._require_long_enough(row, where)
-            raise IntegrityError(f"{where}: {len(data)} bytes were read of {row.clip_size}; read it again")
-        return data
-
-    def _require_long_enough(self, row: IndexRow, where: str) -> None:
-        found, end = self.store.size_bytes(row.shard), row.clip_offset + row.clip_size
-        if found < end:
-            raise IntegrityError(f"{where}: the clip must end at byte {end}, but the shard has {found}; fetch it again")
+    @cached_property
+    def shards(self) -> ShardReader:
+        """What clips are read with; it opens files, or connects, when it is first used."""
+        return open_shards(self.store, self.manifest, AccessConfig())
 
 
 def open_release(location: str | Path) -> Release:

@@ -52,12 +52,10 @@ class ShardReader(Protocol):
         A hint: what was announced may never be read, and what is read may never have been announced.
         """
 
-    def forget(self, shard: str) -> bool:
+    def forget(self, shard: str) -> None:
         """Let go of what is kept of a shard, because bytes that were read from it are not what they should be.
 
-        Returns:
-            Whether reading the stretch again may bring other bytes: True where they come from a store, whose answer or
-            whose copy in a cache may have been damaged on the way; False where they lie on this machine's own disk.
+        The next reading opens the file again, or asks the store.
         """
 
     def close(self) -> None:

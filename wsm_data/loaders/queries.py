@@ -10,6 +10,7 @@ import numpy as np
 import torch
 import torch.utils.data
 
+from wsm_data.access.clip_reader import read_members, span_of_members
 from wsm_data.access.shard_reader import ShardReader
 from wsm_data.errors import IntegrityError
 from wsm_data.geometry.transform import transforms_from_vectors
@@ -18,7 +19,6 @@ from wsm_data.loaders.batches.query_batch import QueryBatch
 from wsm_data.loaders.config import LoaderConfig, ReadConfig
 from wsm_data.loaders.loader import ClipLoader
 from wsm_data.loaders.order.epoch_plan import PlanReport
-from wsm_data.loaders.reading.member_reads import read_members, span_of_members
 from wsm_data.loaders.reading.verification import verification_of
 from wsm_data.loaders.sources.queries import QueryConfig, QuerySources, open_queries
 from wsm_data.schema.clip import TEMPORAL_RATIO, UNREACHABLE_MM

@@ -36,21 +36,6 @@ def encode_clip(clip: Clip) -> tuple[bytes, tuple[Member, ...]]:
     return b"".join(_member_bytes(key, member, contents[member.name]) for member in members), members
 
 
-def check_members(data: memoryview, members: Sequence[Member], where: str) -> None:
-    """Compare the checksum of every member.
-
-    Raises:
-        IntegrityError: names the first member that is damaged.
-    """
-    for member in members:
-        found = xxh3_64(content_of(data, member))
-        if found != member.checksum:
-            raise IntegrityError(
-                f"{where}: the checksum of {member.file_name} must be {member.checksum}, found {found}; "
-                "fetch the shard again, or run `wsm verify` for the extent of the damage"
-            )
-
-
 def decode_clip(data: memoryview, members: Sequence[Member], where: str) -> Clip:
     """Rebuild a clip from its bytes; the arrays are read-only views of `data`.
 

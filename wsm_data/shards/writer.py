@@ -34,7 +34,9 @@ def write_shard(path: Path, layout: ShardLayout, path_of: Callable[[str], Path])
     return write_blocks(path, layout, lambda clip: _checked_blocks(path_of(clip.key), clip))
 
 
-def write_blocks(path: Path, layout: ShardLayout, blocks_of: Callable[[PlacedClip], Iterable[bytes]]) -> ShardInfo:
+def write_blocks(
+    path: Path, layout: ShardLayout, blocks_of: Callable[[PlacedClip], Iterable[bytes | memoryview]]
+) -> ShardInfo:
     """Write the shard of a layout at `path`, atomically, from the bytes of its clips.
 
     Args:

@@ -9,7 +9,7 @@ import pytest
 from wsm_data.errors import DataError, IntegrityError, Reason
 from wsm_data.files.digest import xxh3_64
 from wsm_data.schema.clip import Clip
-from wsm_data.shards.clip_bytes import check_members, decode_clip, encode_clip
+from wsm_data.shards.clip_bytes import decode_clip, encode_clip
 
 
 def test_a_clip_comes_back_to_the_bit(make_clip: Callable[..., Clip]) -> None:
@@ -53,16 +53,6 @@ def test_the_table_gives_the_checksum_of_the_array_bytes_alone(make_clip: Callab
     clip = make_clip()
     _, members = encode_clip(clip)
     assert [member.checksum for member in members[:-1]] == [xxh3_64(a.tobytes()) for a in clip.arrays().values()]
-
-
-def test_a_changed_byte_is_found_in_its_member(make_clip: Callable[..., Clip]) -> None:
-    data, members = encode_clip(make_clip())
-    check_members(memoryview(data), members, "here")
-    for member in members:
-        damaged = bytearray(data)
-        damaged[member.array_offset + member.array_size - 1] ^= 1
-        with pytest.raises(IntegrityError, match=rf"here: the checksum of {member.file_name}"):
-            check_members(memoryview(damaged), members, "here")
 
 
 def test_members_that_are_no_clip_are_refused(make_clip: Callable[..., Clip]) -> None:

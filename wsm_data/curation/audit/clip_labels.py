@@ -8,12 +8,11 @@ import numpy as np
 from wsm_data.access.release import Release
 from wsm_data.curation.path_outline import PATH_POINTS, path_outline
 from wsm_data.errors import IntegrityError
-from wsm_data.files.digest import xxh3_64
 from wsm_data.geometry.transform import transforms_from_vectors
 from wsm_data.schema.arrays import Float64Array
 from wsm_data.schema.clip_meta import ClipMeta
 from wsm_data.shards.index_row import IndexRow
-from wsm_data.shards.members import META, STORED_DTYPES, Member
+from wsm_data.shards.members import META, STORED_DTYPES
 
 _LABELS = ("poses", "expert_distance", META)
 
@@ -42,13 +41,12 @@ class ClipLabels:
 
 
 def read_labels(release: Release, row: IndexRow) -> ClipLabels:
-    """Read the labels of a clip; the checksums of their members are compared.
+    """Read the labels of a clip.
 
     Raises:
         IntegrityError: names shard, clip and member that are damaged.
     """
-    members = {member.name: member for member in row.members if member.name in _LABELS}
-    content = {name: _read(release, row, member) for name, member in members.items()}
+    content = {name: release.read_member(row, name) for name in _LABELS}
     meta = _meta(content[META], row)
     poses = np.frombuffer(content["poses"], STORED_DTYPES["poses"]).reshape(-1, 7)[: meta.frames - meta.padded_frames]
     path_m = (meta.T_world_camera0_matrix @ transforms_from_vectors(poses.astype(np.float64)))[:, :3, 3]
@@ -64,23 +62,8 @@ def read_labels(release: Release, row: IndexRow) -> ClipLabels:
     )
 
 
-def _read(release: Release, row: IndexRow, member: Member) -> bytes:
-    where = f"{row.shard}, clip {row.key}"
+def _meta(data: memoryview, row: IndexRow) -> ClipMeta:
     try:
-        data = release.store.read_range(row.shard, row.clip_offset + member.array_offset, member.array_size)
-    except FileNotFoundError as error:
-        raise IntegrityError(f"{where}: the shard is missing from {release.store.root}; fetch it again") from error
-    found = xxh3_64(data)
-    if found != member.checksum:
-        raise IntegrityError(
-            f"{where}: the checksum of {member.file_name} must be {member.checksum}, found {found}; fetch the shard "
-            "again, or run `wsm verify` for the extent of the damage"
-        )
-    return data
-
-
-def _meta(data: bytes, row: IndexRow) -> ClipMeta:
-    try:
-        return ClipMeta.from_json(json.loads(data))
+        return ClipMeta.from_json(json.loads(bytes(data)))
     except (ValueError, TypeError, KeyError) as error:
         raise IntegrityError(f"{row.shard}, clip {row.key}: meta.json must be that of a clip, but: {error}") from error

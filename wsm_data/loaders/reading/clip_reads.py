@@ -4,7 +4,7 @@ The members that a batch needs stand one after the other in the shard, with thei
 read puts each of them where it belongs; what lies between goes into memory that nobody looks at.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
 from math import prod
 from operator import add, itemgetter
@@ -12,6 +12,7 @@ from operator import add, itemgetter
 import numpy as np
 import xxhash
 
+from wsm_data.access.clip_reader import read_until_whole, wrong_checksum, wrong_header
 from wsm_data.access.shard_reader import ShardReader
 from wsm_data.errors import IntegrityError
 from wsm_data.loaders.reading.clip_places import READ_MEMBERS, ClipPlace, frames_of
@@ -23,9 +24,6 @@ from wsm_data.shards.tar_format import NPY_HEADER_BYTES, padded
 POSE_BYTES = 7 * STORED_DTYPES["poses"].itemsize
 MAX_GAP_BYTES = 1 << 16
 """What lies between two wanted stretches is read along with them up to this size; a second read costs about as much."""
-
-MAX_READS = 3
-"""How often a clip is read whose bytes a store, or a cache, may have damaged on the way."""
 
 _UNWANTED = memoryview(bytearray(MAX_GAP_BYTES))
 _NOTHING = memoryview(b"")
@@ -59,35 +57,27 @@ def read_clip(
     """
     shapes, sizes = _shapes_and_sizes(place.latents, latent_shape)
     _require_sound(place, sizes)
-    if checked:
-        tails = _read_checked(reader, place, shapes, slots, watch)
-    else:
-        tails = _last_pose(place, slots)
+    headers = [memoryview(bytearray(size)) for size in place.gaps] if checked else []
+    tails = _tails(place, slots) if checked else _last_pose(place, slots)
+    pieces = _pieces(place, headers, slots, tails)
+
+    def read() -> None:
         with watch.measure(Part.STORE):
-            _fill(reader, place, _pieces(place, (), slots, tails))
+            _fill(reader, place, pieces)
+
+    def damage() -> str | None:
+        if not checked:
+            return None
+        with watch.measure(Part.CHECKSUM):
+            return _damage(place, shapes, headers, slots, tails)
+
+    read_until_whole(reader, place.shard, place.key, read=read, damage=damage)
     return np.frombuffer((tails[-1] if tails[-1].nbytes else slots[-1])[-POSE_BYTES:], STORED_DTYPES["poses"])
 
 
-def _read_checked(
-    reader: ShardReader,
-    place: ClipPlace,
-    shapes: Sequence[tuple[int, ...]],
-    slots: Sequence[memoryview],
-    watch: Stopwatch,
-) -> list[memoryview]:
-    """Read members to their end, with their headers, and compare both; returns what lies behind each slot."""
-    headers = [memoryview(bytearray(size)) for size in place.gaps]
-    tails = [memoryview(bytearray(size - slot.nbytes)) for size, slot in zip(place.sizes, slots, strict=True)]
-    for reads in range(1, MAX_READS + 1):
-        with watch.measure(Part.STORE):
-            _fill(reader, place, _pieces(place, headers, slots, tails))
-        with watch.measure(Part.CHECKSUM):
-            damage = next(_damage(place, shapes, headers, slots, tails), None)
-        if damage is None:
-            break
-        if not reader.forget(place.shard) or reads == MAX_READS:
-            raise IntegrityError(f"{place.where}: {damage}; fetch the shard again, or run `wsm verify` for the extent")
-    return tails
+def _tails(place: ClipPlace, slots: Sequence[memoryview]) -> list[memoryview]:
+    """Memory for what lies behind each slot, so that members are read to their end."""
+    return [memoryview(bytearray(size - slot.nbytes)) for size, slot in zip(place.sizes, slots, strict=True)]
 
 
 def _last_pose(place: ClipPlace, slots: Sequence[memoryview]) -> list[memoryview]:
@@ -122,20 +112,17 @@ def _fill(reader: ShardReader, place: ClipPlace, pieces: Sequence[tuple[int, mem
     """Read pieces that stand close together at once, with what lies between them."""
     start = end = place.clip_offset
     buffers: list[memoryview] = []
-    try:
-        for offset, buffer in pieces:
-            if offset - end > MAX_GAP_BYTES and buffers:
-                reader.read_into(place.shard, start, buffers)
-                buffers = []
-            if not buffers:
-                start = end = offset
-            elif offset > end:
-                buffers.append(_UNWANTED[: offset - end])
-            buffers.append(buffer)
-            end = offset + buffer.nbytes
-        reader.read_into(place.shard, start, buffers)
-    except IntegrityError as error:
-        raise IntegrityError(f"clip {place.key}: {error}") from error
+    for offset, buffer in pieces:
+        if offset - end > MAX_GAP_BYTES and buffers:
+            reader.read_into(place.shard, start, buffers)
+            buffers = []
+        if not buffers:
+            start = end = offset
+        elif offset > end:
+            buffers.append(_UNWANTED[: offset - end])
+        buffers.append(buffer)
+        end = offset + buffer.nbytes
+    reader.read_into(place.shard, start, buffers)
 
 
 def _damage(
@@ -144,17 +131,18 @@ def _damage(
     headers: Sequence[memoryview],
     slots: Sequence[memoryview],
     tails: Sequence[memoryview],
-) -> Iterator[str]:
-    """What is wrong with the bytes that were read, member by member."""
+) -> str | None:
+    """The first thing that is wrong with the bytes that were read, member by member."""
     before = 0  # bytes of the member before, in whole blocks and in part
     for name, header, shape, size in zip(READ_MEMBERS, headers, shapes, place.sizes, strict=True):
         if header != bytes(padded(before) - before) + array_header(place.key, name, shape):
-            yield f"the header of {name}.npy, or the padding before it, is not that of this clip"
+            return wrong_header(f"{name}.npy")
         before = NPY_HEADER_BYTES + size
     for name, wanted, slot, tail in zip(READ_MEMBERS, place.checksums, slots, tails, strict=True):
         found = _checksum(slot, tail)
         if found != wanted:
-            yield f"the checksum of {name}.npy must be {wanted:016x}, found {found:016x}"
+            return wrong_checksum(f"{name}.npy", f"{wanted:016x}", f"{found:016x}")
+    return None
 
 
 def _checksum(slot: memoryview, tail: memoryview) -> int:

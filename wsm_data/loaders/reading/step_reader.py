@@ -219,5 +219,5 @@ def _open_readers(sources: Sources, read: ReadConfig) -> Sequence[ShardReader]:
     for table in sources.tables:
         root = table.release.store.root
         if root not in by_root:
-            by_root[root] = open_shards(table.release, read)
+            by_root[root] = open_shards(table.release.store, table.release.manifest, read)
     return [by_root[table.release.store.root] for table in sources.tables]

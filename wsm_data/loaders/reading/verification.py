@@ -37,6 +37,6 @@ class Verification:
 
 def verification_of(tables: Sequence[SourceTable], read: ReadConfig) -> Verification:
     """What the settings ask for; `first` is `always` where each reading transfers a clip anew from a store."""
-    is_kept = [reads_again_what_it_read(table.release, read) for table in tables]
+    is_kept = [reads_again_what_it_read(table.release.store, read) for table in tables]
     policies = [Verify.ALWAYS if read.verify is Verify.FIRST and not kept else read.verify for kept in is_kept]
     return Verification(policies, [len(table) for table in tables])

@@ -47,5 +47,5 @@ def test_a_damaged_label_is_named(release, tiny, name):
 def test_a_missing_shard_is_named(release, tiny):
     row = release.index.row_at(1)
     (tiny.folder / row.shard).unlink()
-    with pytest.raises(IntegrityError, match=f"{row.shard}, clip {row.key}: the shard is missing"):
+    with pytest.raises(IntegrityError, match=f"clip {row.key}: {row.shard} is missing from"):
         read_labels(release, row)

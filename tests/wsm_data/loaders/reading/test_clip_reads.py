@@ -3,11 +3,12 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
+from wsm_data.access.clip_reader import MAX_READS
 from wsm_data.access.local_shards import LocalShards
 from wsm_data.errors import IntegrityError
 from wsm_data.loaders.config import SourceConfig
 from wsm_data.loaders.reading.clip_places import READ_MEMBERS, ClipPlace, clip_places, frames_of
-from wsm_data.loaders.reading.clip_reads import MAX_GAP_BYTES, MAX_READS, read_clip
+from wsm_data.loaders.reading.clip_reads import MAX_GAP_BYTES, read_clip
 from wsm_data.loaders.sources.clips import open_sources
 from wsm_data.loaders.timing import Part, Stopwatch
 
@@ -17,10 +18,10 @@ LATENT_SHAPE = (48, 6, 10)
 class Watched:
     """Local shards that note what is read, and may deliver a wrong byte a few times."""
 
-    def __init__(self, folder: str, spoilt: int = 0, again: bool = True):
+    def __init__(self, folder: str, spoilt: int = 0):
         self._shards = LocalShards(folder)
         self.reads: list[int] = []
-        self.spoilt, self.again, self.forgotten = spoilt, again, 0
+        self.spoilt, self.forgotten = spoilt, 0
 
     def read_into(self, shard: str, offset: int, buffers: Sequence[memoryview]) -> None:
         self._shards.read_into(shard, offset, buffers)
@@ -31,9 +32,8 @@ class Watched:
 
     def expect(self, spans: object) -> None: ...
 
-    def forget(self, shard: str) -> bool:
+    def forget(self, shard: str) -> None:
         self.forgotten += 1
-        return self.again
 
     def close(self) -> None:
         self._shards.close()
@@ -99,12 +99,11 @@ def test_bytes_that_a_store_spoilt_are_read_again(released, places, spoilt):
     assert (len(reader.reads), reader.forgotten) == (spoilt + 1, spoilt)
 
 
-@pytest.mark.parametrize(("again", "reads"), [(True, MAX_READS), (False, 1)])
-def test_bytes_that_stay_spoilt_are_refused(released, places, again, reads):
-    reader = Watched(str(released.folder), spoilt=99, again=again)
+def test_bytes_that_stay_spoilt_are_refused(released, places):
+    reader = Watched(str(released.folder), spoilt=99)
     with pytest.raises(IntegrityError, match=f"clip {places[0].key}: the checksum of rgb_latent.npy must be"):
         read_clip(reader, places[0], LATENT_SHAPE, _slots(places[0], 1), checked=True, watch=Stopwatch())
-    assert len(reader.reads) == reads
+    assert len(reader.reads) == MAX_READS
 
 
 def test_reading_and_checking_are_measured_apart(released, places):
