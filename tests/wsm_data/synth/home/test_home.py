@@ -17,7 +17,7 @@ def test_the_same_seed_gives_the_same_home_to_the_bit_and_another_one_another(ho
     again, other = make_home(0, 0), make_home(0, 1)
     for name in ("points_m", "uv_texel", "light", "texels", "texture"):
         assert (getattr(again.mesh, name) == getattr(home.mesh, name)).all()
-    assert other.plan != home.floor_plan
+    assert other.floor_plan != home.floor_plan
 
 
 def test_a_home_has_ten_to_thirty_five_thousand_triangles(home):
