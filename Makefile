@@ -7,6 +7,8 @@ BIN := $(VENV)/bin
 # Byte code is left to the first import of a module: most modules that are installed are never imported.
 INSTALL := $(BIN)/python -m pip -qq --disable-pip-version-check install --no-compile
 DEMO_OUT ?= runs/demo
+# One process of tests a core; whoever is done first takes over tests of the others.
+PYTEST_WORKERS ?= auto
 PYTEST_OPTIONS ?=
 
 .PHONY: demo test check bench
@@ -16,7 +18,7 @@ demo: $(VENV)/.ready
 	$(BIN)/wsm demo --out $(DEMO_OUT)
 
 test: $(VENV)/.ready-dev
-	$(BIN)/python -m pytest $(PYTEST_OPTIONS)
+	$(BIN)/python -m pytest -n $(PYTEST_WORKERS) --dist worksteal $(PYTEST_OPTIONS)
 
 check: $(VENV)/.ready-dev
 	$(BIN)/ruff format --check .

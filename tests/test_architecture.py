@@ -4,6 +4,7 @@ import ast
 import re
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -17,6 +18,7 @@ EVERYTHING = [*SOURCES, *(path for folder in ("tests", "bench") for path in sort
 
 MAX_FILE_LINES = 400
 MAX_FUNCTION_LINES = 80
+MAX_FOLDER_FILES = 20
 MAX_SWALLOWING_HANDLERS = 3
 NAMES_THAT_SAY_NOTHING = {"utils", "util", "misc", "common", "helpers", "helper", "tools", "stuff"}
 SLOW_IMPORTS = {"torch", "cv2", "numba", "matplotlib", "diffusers", "trimesh"}
@@ -146,6 +148,11 @@ def test_functions_are_of_a_readable_length():
     assert [found for found in functions if found[1] > MAX_FUNCTION_LINES] == []
 
 
+def test_folders_are_of_a_readable_length():
+    files = Counter(relative(path.parent) for path in SOURCES if path.name != "__init__.py")
+    assert {folder: count for folder, count in files.items() if count > MAX_FOLDER_FILES} == {}
+
+
 def test_no_module_or_folder_has_a_name_that_says_nothing():
     words = {
         relative(path): {part.removeprefix("test_") for part in Path(relative(path)).with_suffix("").parts}
@@ -182,10 +189,10 @@ def test_every_module_of_the_library_has_a_test_of_the_same_name():
 
 def test_every_test_of_a_module_stands_where_its_module_does():
     mirrored = [path for package in PACKAGES for path in (ROOT / "tests" / package).rglob("test_*.py")]
-    """Tests of one module may fill two files: test_encode.py and test_encode_refusals.py."""
     modules = {mirror(path) for path in SOURCES}
 
     def stands_right(test: Path) -> bool:
+        """Tests of one module may fill two files: test_encode.py and test_encode_refusals.py."""
         words = test.stem.split("_")
         stems = ["_".join(words[:count]) for count in range(2, len(words) + 1)]
         return any(test.relative_to(ROOT / "tests").with_name(f"{stem}.py") in modules for stem in stems)

@@ -33,8 +33,7 @@ def test_slurm_is_refused_where_nothing_can_be_submitted(monkeypatch):
         engine("slurm")
 
 
-@pytest.mark.parametrize(("name", "package"), [(EngineName.RAY, "ray"), (EngineName.SLURM, "submitit")])
-def test_an_installed_engine_is_found(monkeypatch, name, package):
-    pytest.importorskip(package, reason=f"{package} is not installed")
+@pytest.mark.parametrize("name", [EngineName.RAY, EngineName.SLURM])
+def test_an_installed_engine_is_found(monkeypatch, name):
     monkeypatch.setattr(shutil, "which", lambda _: "sbatch")
-    assert engine(name).__module__ == f"pipelines.engines.{name}"
+    assert engine(name).__module__ == f"pipelines.running.engines.{name}"

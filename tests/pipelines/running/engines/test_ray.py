@@ -5,59 +5,51 @@ from pathlib import Path
 
 import fake_tasks
 import pytest
+import ray
 from fake_stages import COPY, CopyConfig
 from fake_tasks import die, fail, numbers_below, process_id, refuse
 
+from pipelines.running.engines.ray import run_ray
 from pipelines.running.runner import RunOptions, run_stage
 from wsm_data.errors import DataError, Reason, WsmError
-
-ray = pytest.importorskip("ray", reason="ray is not installed")
-
-pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module", autouse=True)
 def cluster():
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PYTHONPATH", str(Path(fake_tasks.__file__).parent))
+        patch.setenv("RAY_USAGE_STATS_ENABLED", "0")
         ray.init(num_cpus=2, include_dashboard=False)
         yield
         ray.shutdown()
 
 
-@pytest.fixture
-def run_ray():
-    from pipelines.running.engines.ray import run_ray
-
-    return run_ray
-
-
-def test_every_result_of_every_task_arrives_once(run_ray):
+def test_every_result_of_every_task_arrives_once():
     expected = sorted((task, number) for task in range(5) for number in range(task))
     assert sorted(run_ray(list(range(5)), numbers_below, 2)) == expected
 
 
-def test_tasks_run_in_other_processes(run_ray):
+def test_tasks_run_in_other_processes():
     assert os.getpid() not in set(run_ray([0, 1], process_id, 2))
 
 
-def test_a_foreseen_error_arrives_whole(run_ray):
+def test_a_foreseen_error_arrives_whole():
     with pytest.raises(DataError, match="seven is bad") as caught:
         list(run_ray([7, 8], refuse, 2))
     assert (caught.value.reason, caught.value.details) == (Reason.FRAME_EMPTY, {"number": 7})
 
 
-def test_a_bug_arrives_with_its_traceback(run_ray):
+def test_a_bug_arrives_with_its_traceback():
     with pytest.raises(RuntimeError, match=r"(?s)in fail\n.*ZeroDivisionError"):
         list(run_ray([1, 2], fail, 2))
 
 
-def test_a_worker_that_dies_is_told(run_ray):
+def test_a_worker_that_dies_is_told():
     with pytest.raises(WsmError, match="ray lost a worker"):
         list(run_ray([1, 2], die, 2))
 
 
-def test_a_stage_writes_the_same_bytes_as_with_local_processes(run_ray, source, tmp_path):
+def test_a_stage_writes_the_same_bytes_as_with_local_processes(source, tmp_path):
     (source / "a3.txt").write_text("bad")
     options = RunOptions(quiet=True, max_refused=5, workers=2)
     run_stage(COPY, CopyConfig(source=source), tmp_path / "local", options)
@@ -66,7 +58,7 @@ def test_a_stage_writes_the_same_bytes_as_with_local_processes(run_ray, source, 
         assert (tmp_path / "ray" / name).read_bytes() == (tmp_path / "local" / name).read_bytes()
 
 
-def test_a_cluster_that_the_engine_started_is_stopped_at_the_end(run_ray):
+def test_a_cluster_that_the_engine_started_is_stopped_at_the_end():
     ray.shutdown()
     assert len(list(run_ray([0, 1], numbers_below, 2))) == 1
     assert not ray.is_initialized()

@@ -8,17 +8,14 @@ import pytest
 from fake_stages import COPY, CopyConfig
 from fake_tasks import die, fail_but_two, numbers_below, process_id, refuse
 
+from pipelines.running.engines.slurm import run_slurm
 from pipelines.running.folder import read_ledger
 from pipelines.running.runner import RunOptions, run_stage
 from wsm_data.errors import DataError, WsmError
 
-pytest.importorskip("submitit", reason="submitit is not installed")
-
 
 @pytest.fixture
 def run_here(tmp_path, monkeypatch, fakes_on_path):
-    from pipelines.running.engines.slurm import run_slurm
-
     monkeypatch.chdir(tmp_path)  # where the jobs' folder is made
     monkeypatch.setenv("PYTHONPATH", fakes_on_path["PYTHONPATH"])
     return partial(run_slurm, cluster="local")

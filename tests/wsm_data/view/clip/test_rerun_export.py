@@ -1,10 +1,12 @@
-"""Recordings are written with whatever rerun-sdk is installed, and read back where it has `rerun.chunk`."""
+"""Recordings are written with rerun's SDK and read back with its reader of chunks."""
 
 import dataclasses
 import sys
 
 import numpy as np
 import pytest
+import rerun as rr
+from rerun.chunk import RrdReader
 
 from wsm_data.errors import ConfigError
 from wsm_data.schema.clip import Clip
@@ -18,16 +20,14 @@ PINHOLE = "/world/camera/pinhole"
 
 def read_back(path) -> dict[str, list]:
     """`entity component` to its values in the order of their frames; a component that stands still has one."""
-    chunk = pytest.importorskip("rerun.chunk", reason="this rerun-sdk, or none, cannot read a recording by chunks")
     found = {}
-    for part in chunk.RrdReader(path).stream():
+    for part in RrdReader(path).stream():
         for name, values in part.to_record_batch().to_pydict().items():
             found.setdefault(f"{part.entity_path} {name}", []).extend(values)
     return found
 
 
 def write(clip: Clip, codec, path):
-    pytest.importorskip("rerun", reason="rerun-sdk is not installed; it comes with the extra `viz`")
     write_rerun(clip, codec, path)
     return path
 
@@ -207,6 +207,5 @@ def test_rerun_switched_off_is_refused_instead_of_an_empty_recording(turned, mad
 
 
 def test_the_strictness_of_the_caller_is_put_back(turned, made, tmp_path):
-    rr = pytest.importorskip("rerun", reason="rerun-sdk is not installed; it comes with the extra `viz`")
     write(turned, made.codec, tmp_path / "clip.rrd")
     assert not rr.error_utils.strict_mode()
