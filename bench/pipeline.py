@@ -21,7 +21,8 @@ from reporting import machine, machine_line, table, write_results
 
 from pipelines.recipe import Recipe, stage_config
 from pipelines.running.engines.local import run_local
-from pipelines.running.runner import RunOptions, run_stage
+from pipelines.running.options import RunOptions
+from pipelines.running.runner import run_stage
 from pipelines.running.stage import Outcome, StageContext, Unit
 from pipelines.stages import encode, index
 from pipelines.stages import map as map_stage

@@ -2,10 +2,14 @@
 
 import importlib
 from dataclasses import dataclass
-from typing import Any
+from types import ModuleType
+from typing import TYPE_CHECKING
 
 from wsm_data.errors import ConfigError
 from wsm_data.files.typed_toml import did_you_mean
+
+if TYPE_CHECKING:  # it brings numpy, and the command line lists the stages without it
+    from pipelines.running.stage import AnyStage
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,16 +41,17 @@ STAGES: tuple[StageEntry, ...] = (
 )
 
 
-def load_stage(name: str) -> Any:
+def load_stage(name: str) -> "AnyStage":
     """The `Stage` of a name.
 
     Raises:
         ConfigError: there is no such stage.
     """
-    return load_stage_module(name).STAGE
+    stage: AnyStage = load_stage_module(name).STAGE
+    return stage
 
 
-def load_stage_module(name: str) -> Any:
+def load_stage_module(name: str) -> ModuleType:
     """The module of a stage.
 
     Raises:

@@ -10,7 +10,8 @@ from hypothesis import settings
 
 from pipelines.recipe import Recipe, stage_config
 from pipelines.registry import load_stage
-from pipelines.running.runner import RunOptions, run_stage
+from pipelines.running.options import RunOptions
+from pipelines.running.runner import run_stage
 from pipelines.running.stage_report import StageReport
 from wsm_data.synth.config import SynthConfig
 from wsm_data.synth.writers.scenes import write_scene

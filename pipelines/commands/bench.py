@@ -1,98 +1,41 @@
-"""`wsm bench loader`: what a loader delivers on this machine, what holds it up, and what to change."""
+"""`wsm bench`: measures a part of the pipeline on this machine."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from typing import Annotated
 
 import typer
 
-from pipelines.running.settings import merge, parse_assignments
-from wsm_data.files.typed_toml import build_config
-from wsm_data.loaders.config import LoaderConfig, OrderConfig, ReadConfig, SourceConfig
-from wsm_data.loaders.doctor.diagnosis import LoaderRun, cautions, diagnose, readers
-from wsm_data.loaders.doctor.examine import examine
-from wsm_data.loaders.timing import Part
-from wsm_data.view.drawing.text_table import aligned
-
-SWEPT_THREADS = (1, 2, 4)
-_PARTS = {
-    Part.STORE: "reading from the store",
-    Part.CHECKSUM: "comparing checksums",
-    Part.COLLATE: "making batches, standardising",
-    Part.TRANSFER: "copying to the device",
-}
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Settings:
-    """What `--set` changes: sections of a loader's settings."""
-
-    source: SourceConfig
-    order: OrderConfig = field(default_factory=OrderConfig)
-    read: ReadConfig = field(default_factory=ReadConfig)
+from pipelines.commands.command import Command, CommandGroup
+from pipelines.commands.options import Release
 
 
 def bench_loader(
-    release: str, assignments: Sequence[str], batches: int, seconds: float, step_s: float, ranks: int, sweep: bool
+    release: Release,
+    assignments: Annotated[
+        list[str] | None,
+        typer.Option("--set", "-s", help="One setting, as read.threads=4, order.global_batch=16, source.split=test."),
+    ] = None,
+    batches: Annotated[int, typer.Option("--batches", min=1, help="Batches to take at most.")] = 1000,
+    seconds: Annotated[float, typer.Option("--seconds", min=0.1, help="Time to measure at most, s.")] = 5.0,
+    step_ms: Annotated[
+        float, typer.Option("--step-ms", min=0, help="Time a training step takes, ms; 0: take batches as they come.")
+    ] = 0.0,
+    ranks: Annotated[int, typer.Option("--ranks", min=1, help="Ranks of the run; rank 0 is measured here, alone.")] = 1,
+    sweep: Annotated[bool, typer.Option("--sweep", help="Compare 1, 2 and 4 threads too.")] = False,
 ) -> None:
-    """Print what a loader of a release does, where its time goes, and what to do about it.
+    """Run the loader doctor."""
+    from pipelines.operations import bench
 
-    Args:
-        release: folder or URL.
-        assignments: `--set` words with the sections source, order and read.
-        batches: batches to take at most.
-        seconds: when to stop, s.
-        step_s: time that a training step takes, s; 0 takes batches as fast as they come.
-        ranks: ranks of the training run; the loader of rank 0 is measured.
-        sweep: compare some numbers of threads too.
-
-    Raises:
-        ConfigError: the settings are wrong, or there is no such release.
-    """
-    values = merge({"source": {"release": release}}, parse_assignments(assignments))
-    settings = build_config(_Settings, values)
-    config = LoaderConfig(sources=(settings.source,), order=settings.order, read=settings.read)
-    run, facts = examine(config, batches=batches, seconds=seconds, step_s=step_s, ranks=ranks)
-    typer.echo(describe(run, config.read, ranks))
-    typer.echo(f"\n{diagnose(run, config.read)}")
-    for caution in cautions(facts, config.order):
-        typer.echo(f"warning: {caution}")
-    if sweep:
-        typer.echo(f"\n{_sweep(config, batches, seconds, ranks)}")
+    bench.bench_loader(release, assignments or [], batches, seconds, step_ms / 1000, ranks, sweep)
 
 
-def describe(run: LoaderRun, read: ReadConfig, ranks: int) -> str:
-    """The table of a run: rates, and where the time went."""
-    limit = "one stream from the store" if run.remote else "one thread into one buffer"
-    rates = aligned(
-        [
-            ["measured" if ranks == 1 else f"measured on rank 0 of {ranks}", "", ""],
-            ["samples", f"{run.clips / run.elapsed_s:,.1f}", f"clips/s, {run.clips} in {run.elapsed_s:.1f} s"],
-            ["bytes", f"{run.bytes_per_s / 1e6:,.0f}", "MB/s as stored"],
-            ["limit", f"{run.limit_bytes_per_s / 1e6:,.0f}", f"MB/s, {limit}, the same clips"],
-            ["first batch", f"{1000 * run.first_batch_s:,.0f}", "ms, opening included"],
-        ],
-        right=[1],
-    )
-    of_all = readers(read) * run.elapsed_s
-    parts = [[text, f"{run.seconds[part]:.2f}", f"{run.seconds[part] / of_all:.0%}"] for part, text in _PARTS.items()]
-    header = [f"time of {readers(read)} {'threads' if read.threads else 'caller'}", "s", "share"]
-    waited = run.seconds[Part.WAIT]
-    rows = [header, *parts, ["the consumer waited", f"{waited:.2f}", f"{waited / run.elapsed_s:.0%}"]]
-    return f"{rates}\n\n{aligned(rows, right=[1, 2])}"
-
-
-def _sweep(config: LoaderConfig, batches: int, seconds: float, ranks: int) -> str:
-    """The same with other numbers of threads, one after the other."""
-    rows = [["threads", "clips/s", "MB/s", "first batch, ms"]]
-    for threads in SWEPT_THREADS:
-        read = replace(config.read, threads=threads)
-        run, _ = examine(replace(config, read=read), batches=batches, seconds=seconds, ranks=ranks)
-        rows.append(
-            [
-                str(threads),
-                f"{run.clips / run.elapsed_s:,.1f}",
-                f"{run.bytes_per_s / 1e6:,.0f}",
-                f"{1000 * run.first_batch_s:,.0f}",
-            ]
-        )
-    return aligned(rows, right=range(4))
+GROUP = CommandGroup(
+    name="bench",
+    summary="Measure a part of the pipeline on this machine.",
+    commands=(
+        Command(
+            name="loader",
+            summary="The loader doctor: run the real loader, say what holds it up and what to change.",
+            call=bench_loader,
+        ),
+    ),
+)

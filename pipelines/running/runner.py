@@ -9,11 +9,12 @@ from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Generic
 
 from tqdm import tqdm
 
 from pipelines.running.budget import RefusalCount, count_refusals, over_budget, with_outcome
+from pipelines.running.conflict import conflict, fingerprint
 from pipelines.running.engines.choice import Engine
 from pipelines.running.engines.local import run_local
 from pipelines.running.folder import (
@@ -31,8 +32,9 @@ from pipelines.running.folder import (
     write_quarantine,
     write_stage_record,
 )
-from pipelines.running.settings import config_json, differences, settings_of
-from pipelines.running.stage import REFUSED, Finished, Outcome, Settled, Stage, StageContext, Unit, refused
+from pipelines.running.options import RunOptions
+from pipelines.running.settings import config_json, settings_of
+from pipelines.running.stage import REFUSED, ConfigT, Finished, Outcome, Settled, Stage, StageContext, Unit, refused
 from pipelines.running.stage_report import StageReport, stage_report
 from pipelines.running.upstream import pending_units, quarantine_of, upstream_records
 from wsm_data.errors import BudgetExceeded, ConfigError, DataError, WsmError
@@ -43,38 +45,11 @@ from wsm_data.schema.verdict import Refusal
 
 
 @dataclass(frozen=True, kw_only=True)
-class RunOptions:
-    """What to run now. None of it is a setting: none of it changes the bytes of a unit.
-
-    Attributes:
-        workers: worker processes.
-        limit: at most this many pending units; 0 for all.
-        only: patterns of unit ids (`gibson_*/*`); empty for all.
-        dry_run: list what would be done and stop.
-        max_refused: what may be refused. Below 1 a share: of the listed units, and by itself of the parts that were
-            found in them (trajectories in a container), which is known when all selected units are settled. From 1 on
-            a number: of refused units and refused parts together. What `finish` refuses counts as parts.
-        fork: when the settings differ from those in the folder, use a folder beside it instead of stopping.
-        retry_refused: try refused units again although neither their input nor the settings changed.
-        quiet: no progress bar.
-    """
-
-    workers: int = 1
-    limit: int = 0
-    only: tuple[str, ...] = ()
-    dry_run: bool = False
-    max_refused: float = 0.1
-    fork: bool = False
-    retry_refused: bool = False
-    quiet: bool = False
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Job:
+class _Job(Generic[ConfigT]):
     """One run of a stage: what is listed, and what the ledger said when it began."""
 
-    stage: Stage[Any]
-    config: Any
+    stage: Stage[ConfigT]
+    config: ConfigT
     out: Path
     record: StageRecord
     waits_for: tuple[str, ...]
@@ -96,7 +71,7 @@ class _Job:
 
 
 def run_stage(
-    stage: Stage[Any], config: Any, out: Path, options: RunOptions | None = None, engine: Engine = run_local
+    stage: Stage[ConfigT], config: ConfigT, out: Path, options: RunOptions | None = None, engine: Engine = run_local
 ) -> StageReport:
     """Bring a stage's folder up to date with its inputs.
 
@@ -117,8 +92,11 @@ def run_stage(
     units = stage.list_units(config)
     _require_unique(stage, units)
     _require_match(stage, units, options.only)
-    record = _record(stage, config, upstream, len(units), options.workers)
-    out = _choose_folder(out, record, options.fork)
+    record = _record(stage, config, upstream, len(units), options.processes)
+    refused_here = conflict(stage, config, out)
+    if refused_here and not options.fork:
+        raise ConfigError(refused_here)
+    out = out.with_name(f"{out.name}-{record.fingerprint[:8]}") if refused_here else out
     keys = {unit.id: unit_key(record, unit) for unit in units}
     job = _Job(
         stage=stage,
@@ -149,7 +127,7 @@ def run_stage(
     return _report(job, selected, time.monotonic() - started)
 
 
-def _report(job: _Job, ran: Sequence[Unit], seconds: float) -> StageReport:
+def _report(job: _Job[ConfigT], ran: Sequence[Unit], seconds: float) -> StageReport:
     settled = job.settled()
     known = {(one.unit, one.source, one.reason) for outcome in settled.outcomes.values() for one in outcome.refusals}
     extra = [one for one in quarantine_of(job.out) if (one.unit, one.source, one.reason) not in known]
@@ -157,23 +135,18 @@ def _report(job: _Job, ran: Sequence[Unit], seconds: float) -> StageReport:
     return replace(report, waits_for=job.waits_for)
 
 
-def fingerprint(stage: Stage[Any], config: Any) -> str:
-    """Digest of what decides the bytes of a stage beside its inputs: name, version and settings."""
-    return digest_json({"name": stage.name, "version": stage.version, "settings": settings_of(config)})
-
-
 def unit_key(record: StageRecord, unit: Unit) -> str:
     """Key under which a unit is settled: digest of its inputs' content, the stage's version and its settings."""
     return digest_json({"fingerprint": record.fingerprint, "inputs": dict(unit.inputs)})
 
 
-def _require_unique(stage: Stage[Any], units: Sequence[Unit]) -> None:
+def _require_unique(stage: Stage[ConfigT], units: Sequence[Unit]) -> None:
     twice = [unit for unit, count in Counter(unit.id for unit in units).items() if count > 1]
     if twice:
         raise WsmError(f"{stage.name}: unit ids must be unique, found twice: {', '.join(sorted(twice)[:5])}")
 
 
-def _require_match(stage: Stage[Any], units: Sequence[Unit], only: Sequence[str]) -> None:
+def _require_match(stage: Stage[ConfigT], units: Sequence[Unit], only: Sequence[str]) -> None:
     unmatched = [one for one in only if not fnmatch.filter([unit.id for unit in units], one)]
     if unmatched:
         example = f"; ids look like {units[0].id}" if units else ""
@@ -181,7 +154,7 @@ def _require_match(stage: Stage[Any], units: Sequence[Unit], only: Sequence[str]
 
 
 def _record(
-    stage: Stage[Any], config: Any, upstream: Mapping[str, StageRecord], units: int, workers: int
+    stage: Stage[ConfigT], config: ConfigT, upstream: Mapping[str, StageRecord], units: int, workers: int
 ) -> StageRecord:
     return StageRecord(
         name=stage.name,
@@ -196,25 +169,6 @@ def _record(
     )
 
 
-def _choose_folder(out: Path, record: StageRecord, fork: bool) -> Path:
-    old = read_stage_record(out)
-    if old is None or old.fingerprint == record.fingerprint:
-        return out
-    if fork:
-        return out.with_name(f"{out.name}-{record.fingerprint[:8]}")
-    if old.name != record.name:
-        raise ConfigError(f"{out} holds the output of `wsm {old.name}`, not of `wsm {record.name}`; use another --out")
-    changes = differences(
-        {"version of the stage": old.version, **old.settings},
-        {"version of the stage": record.version, **record.settings},
-    )
-    raise ConfigError(
-        f"{out} was written with other settings of `wsm {record.name}`:\n  "
-        + "\n  ".join(changes)
-        + "\nUse the old settings, another --out, or --fork to write beside it."
-    )
-
-
 def _standing(out: Path) -> dict[str, LedgerEntry]:
     """The last word on every unit whose outputs are as it left them; one whose outputs are not is pending again."""
     return {unit: entry for unit, entry in read_ledger(out, with_stale=True).items() if _is_whole(out, entry)}
@@ -226,7 +180,7 @@ def _is_whole(out: Path, entry: LedgerEntry) -> bool:
     return all(is_as_written(out / output, size) for output, size in zip(outputs, sizes, strict=True))
 
 
-def _selected(job: _Job) -> list[Unit]:
+def _selected(job: _Job[ConfigT]) -> list[Unit]:
     """Pending units that the options ask for, in the order of the listing."""
     only = job.options.only
     chosen = [
@@ -237,14 +191,14 @@ def _selected(job: _Job) -> list[Unit]:
     return chosen[: job.options.limit] if job.options.limit else chosen
 
 
-def _is_settled(job: _Job, unit: Unit) -> bool:
+def _is_settled(job: _Job[ConfigT], unit: Unit) -> bool:
     entry = job.ledger.get(unit.id)
     if entry is None or entry.key != job.keys[unit.id]:
         return False
     return entry.outcome.state != REFUSED or not job.options.retry_refused
 
 
-def _work(job: _Job, selected: Sequence[Unit]) -> None:
+def _work(job: _Job[ConfigT], selected: Sequence[Unit]) -> None:
     again = {unit.id for unit in selected}
     standing = [outcome for unit, outcome in job.settled().outcomes.items() if unit not in again]
     count = replace(count_refusals(standing, len(job.units), job.stage.parts_fact), found=None)
@@ -255,7 +209,7 @@ def _work(job: _Job, selected: Sequence[Unit]) -> None:
         tqdm(total=len(selected), desc=job.stage.name, unit="unit", disable=hidden, dynamic_ncols=True) as bar,
         ledger_appender(job.out) as append,
         closing(
-            job.engine(_batches(selected, job.options.workers), work, job.options.workers)
+            job.engine(_batches(selected, job.options.processes), work, job.options.processes)
         ) as outcomes,  # no worker outlives the lock
     ):
         for outcome in outcomes:
@@ -265,7 +219,7 @@ def _work(job: _Job, selected: Sequence[Unit]) -> None:
             _keep_to_budget(job, count)
 
 
-def _keep_to_budget(job: _Job, count: RefusalCount, extra: Sequence[Refusal] = ()) -> None:
+def _keep_to_budget(job: _Job[ConfigT], count: RefusalCount, extra: Sequence[Refusal] = ()) -> None:
     exceeding = over_budget(job.options.max_refused, count)
     if not exceeding:
         return
@@ -290,7 +244,9 @@ def _batches(units: Sequence[Unit], workers: int) -> list[list[Unit]]:
     return sorted(ordered, key=len, reverse=True) if workers > 1 else ordered
 
 
-def _process_batch(stage: Stage[Any], config: Any, context: StageContext, batch: Sequence[Unit]) -> Iterator[Outcome]:
+def _process_batch(
+    stage: Stage[ConfigT], config: ConfigT, context: StageContext, batch: Sequence[Unit]
+) -> Iterator[Outcome]:
     """Outcomes of one batch, each with the time it took; runs inside a worker."""
     left = {unit.id: unit for unit in batch}
     started = time.perf_counter()
@@ -322,7 +278,7 @@ def _full_disk_named(folder: Path) -> Iterator[None]:
         ) from error
 
 
-def _is_finished(job: _Job) -> bool:
+def _is_finished(job: _Job[ConfigT]) -> bool:
     """Whether `finish` came to its end for these very outcomes and upstream states, and what it wrote is there."""
     old = read_stage_record(job.out)
     if old is None or old.finished != _state(job):
@@ -331,7 +287,7 @@ def _is_finished(job: _Job) -> bool:
     return all(is_as_written(job.out / output, size) for output, size in written.items())
 
 
-def _keep_record_current(job: _Job) -> None:
+def _keep_record_current(job: _Job[ConfigT]) -> None:
     """Inputs may lie elsewhere than when the stage was finished: later stages find them through the record."""
     old = read_stage_record(job.out)
     if old is None:
@@ -341,7 +297,7 @@ def _keep_record_current(job: _Job) -> None:
         write_stage_record(job.out, new)
 
 
-def _state(job: _Job) -> str:
+def _state(job: _Job[ConfigT]) -> str:
     settled = job.settled()
     return digest_json(
         [
@@ -356,7 +312,7 @@ def _state(job: _Job) -> str:
     )
 
 
-def _finish(job: _Job) -> None:
+def _finish(job: _Job[ConfigT]) -> None:
     """Write what belongs to no single unit, the record last."""
     settled = job.settled()
     end = job.stage.finish(job.config, StageContext(out=job.out), settled) if job.stage.finish else Finished()
@@ -369,7 +325,7 @@ def _finish(job: _Job) -> None:
     write_stage_record(job.out, replace(job.record, finished=_state(job), outputs=outputs))
 
 
-def _stale(job: _Job) -> dict[str, LedgerEntry]:
+def _stale(job: _Job[ConfigT]) -> dict[str, LedgerEntry]:
     """Finished work that is no result now, and may be one again without being done again.
 
     A unit is not listed when the upstream unit it follows from is pending, such as the trajectories of a container that
@@ -380,10 +336,10 @@ def _stale(job: _Job) -> dict[str, LedgerEntry]:
     return {unit: entry for unit, entry in job.ledger.items() if unit in may_return and unit not in settled.outcomes}
 
 
-def _write_refusals(job: _Job, extra: Sequence[Refusal]) -> None:
+def _write_refusals(job: _Job[ConfigT], extra: Sequence[Refusal]) -> None:
     write_quarantine(job.out, job.record, _refusals(job, extra))
 
 
-def _refusals(job: _Job, extra: Sequence[Refusal]) -> list[Refusal]:
+def _refusals(job: _Job[ConfigT], extra: Sequence[Refusal]) -> list[Refusal]:
     outcomes = job.settled().outcomes.values()
     return [*(refusal for outcome in outcomes for refusal in outcome.refusals), *extra]

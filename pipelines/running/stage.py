@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, TypeAlias, TypeVar
 
 from wsm_data.errors import DataError
 from wsm_data.schema.verdict import Refusal
@@ -122,6 +122,10 @@ class Stage(Generic[ConfigT]):
     finish: Callable[[ConfigT, StageContext, Settled], Finished] | None = None
     parts_fact: str = ""
     finish_inputs: Callable[[ConfigT], Mapping[str, str]] | None = None
+
+
+AnyStage: TypeAlias = Stage[Any]
+"""A stage that is found by its name: its config is built from its `config_type`, and fits."""
 
 
 def refused(unit: Unit, error: DataError) -> Outcome:

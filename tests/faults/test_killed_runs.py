@@ -14,7 +14,8 @@ from itertools import count
 import pytest
 from fake_stages import COPY, CopyConfig
 
-from pipelines.running.runner import RunOptions, run_stage
+from pipelines.running.options import RunOptions
+from pipelines.running.runner import run_stage
 from pipelines.running.upstream import require_stage
 from wsm_data.errors import ConfigError
 
@@ -136,7 +137,8 @@ PROGRAM = """
 import sys
 from pathlib import Path
 from fake_stages import COPY, CopyConfig
-from pipelines.running.runner import RunOptions, run_stage
+from pipelines.running.options import RunOptions
+from pipelines.running.runner import run_stage
 if __name__ == "__main__":
     source, out, workers = Path(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3])
     run_stage(COPY, CopyConfig(source=source, pause_s=0.03), out, RunOptions(quiet=True, workers=workers))

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from pipelines.commands.audit_run import audit_run
+from pipelines.operations.audit_run import audit_run
 from wsm_data.errors import IntegrityError
 from wsm_data.loaders.ledger.audit import audit_epochs
 from wsm_data.loaders.ledger.sources import open_recorded_sources

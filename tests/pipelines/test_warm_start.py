@@ -12,7 +12,8 @@ from box_room import MANIFEST_TOML, along_x, scene_files, write_folder
 from numba.core.dispatcher import Dispatcher
 from wsm_data.clips.config import ClipConfig
 from pipelines.registry import load_stage
-from pipelines.running.runner import RunOptions, run_stage
+from pipelines.running.options import RunOptions
+from pipelines.running.runner import run_stage
 from pipelines.stages.encode import EncodeConfig
 from pipelines.stages.index import IndexConfig
 from pipelines.stages.map import MapConfig

@@ -9,7 +9,8 @@ from box_room import DATASET, MANIFEST_TOML, along_x, scene_files, write_archive
 
 from pipelines.artifacts.layout import conventions_path
 from pipelines.artifacts.source import container_from_json, container_json, conventions_digest, indexed_source
-from pipelines.running.runner import RunOptions, run_stage
+from pipelines.running.options import RunOptions
+from pipelines.running.runner import run_stage
 from pipelines.stages.index import STAGE, IndexConfig
 from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.readers.interndata.containers import Layout, find_containers

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from fake_stages import CALLS, CopyConfig
 
-from pipelines.running.runner import RunOptions
+from pipelines.running.options import RunOptions
 
 FAKES = Path(__file__).parent
 

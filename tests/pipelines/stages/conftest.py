@@ -11,7 +11,8 @@ from box_room import MANIFEST_TOML, UPSTAIRS, Drive, Room, along_x, scene_files,
 
 from pipelines.registry import load_stage
 from pipelines.running.folder import read_ledger
-from pipelines.running.runner import RunOptions, run_stage
+from pipelines.running.options import RunOptions
+from pipelines.running.runner import run_stage
 from pipelines.running.stage import Outcome, Stage, Unit
 from pipelines.running.stage_report import StageReport
 from pipelines.stages.encode import EncodeConfig

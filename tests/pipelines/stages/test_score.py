@@ -9,7 +9,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from pipelines.registry import load_stage
-from pipelines.running.runner import RunOptions, run_stage
+from pipelines.running.options import RunOptions
+from pipelines.running.runner import run_stage
 from pipelines.stages import score as stage_module
 from pipelines.stages.score import ScoreConfig
 from pipelines.stages.verify import VerifyConfig

@@ -8,7 +8,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from pipelines.registry import load_stage
-from pipelines.running.runner import RunOptions, run_stage
+from pipelines.running.options import RunOptions
+from pipelines.running.runner import run_stage
 from pipelines.running.settings import parse_assignments
 from pipelines.stages.score import ScoreConfig
 from pipelines.stages.select import SelectConfig, install_selection

@@ -5,7 +5,8 @@ import trimesh
 
 from pipelines.registry import load_stage
 from pipelines.running.folder import read_ledger
-from pipelines.running.runner import RunOptions, run_stage
+from pipelines.running.options import RunOptions
+from pipelines.running.runner import run_stage
 from wsm_data.readers.interndata.containers import find_containers
 from wsm_data.readers.manifest import load_dataset
 from wsm_data.synth.config import SynthConfig

@@ -10,7 +10,8 @@ from fake_stages import COPY, CopyConfig
 from fake_tasks import die, fail, numbers_below, process_id, refuse
 
 from pipelines.running.engines.ray import run_ray
-from pipelines.running.runner import RunOptions, run_stage
+from pipelines.running.options import RunOptions
+from pipelines.running.runner import run_stage
 from wsm_data.errors import DataError, Reason, WsmError
 
 

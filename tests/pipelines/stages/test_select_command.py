@@ -6,8 +6,9 @@ import pytest
 from typer.testing import CliRunner
 
 from pipelines.cli import app
-from pipelines.running.runner import RunOptions, run_stage
-from pipelines.stages.materialise import STAGE, MaterialiseConfig
+from pipelines.operations.materialise import STAGE, MaterialiseConfig
+from pipelines.running.options import RunOptions
+from pipelines.running.runner import run_stage
 from pipelines.stages.verify import require_sound
 from wsm_data.access.release import open_release
 from wsm_data.errors import ConfigError

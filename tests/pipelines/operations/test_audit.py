@@ -5,7 +5,8 @@ import json
 import pytest
 from typer.testing import CliRunner
 
-from pipelines.cli import FailOn, app
+from pipelines.cli import app
+from pipelines.commands.audit import FailOn
 from wsm_data.curation.audit.finding import Severity
 from wsm_data.shards.manifest import release_digest
 

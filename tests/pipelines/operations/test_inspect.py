@@ -5,10 +5,11 @@ import pytest
 from box_room import MANIFEST_TOML, along_x, scene_files, write_folder
 
 from pipelines.cli import app
-from pipelines.commands.inspect import inspect_release
+from pipelines.operations.inspect import inspect_release
 from pipelines.recipe import Recipe, stage_config
 from pipelines.registry import load_stage
-from pipelines.running.runner import RunOptions, run_stage
+from pipelines.running.options import RunOptions
+from pipelines.running.runner import run_stage
 from wsm_data.errors import ConfigError, IntegrityError
 
 SCENE = "box_zed/Acker.ville"
@@ -108,7 +109,7 @@ def test_a_recording_takes_the_place_of_the_sheet_unless_both_are_asked_for(
     release, capsys, tmp_path, monkeypatch, sheet
 ):
     monkeypatch.setattr(
-        "pipelines.commands.inspect.write_rerun", lambda clip, codec, path: path.write_bytes(b"recording")
+        "pipelines.operations.inspect.write_rerun", lambda clip, codec, path: path.write_bytes(b"recording")
     )
     monkeypatch.chdir(tmp_path)
     inspect(release, key=KEYS[0], out=sheet and tmp_path / sheet, rerun=tmp_path / "clip.rrd")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from pipelines.cli import app
-from pipelines.commands.audit_run import audit_run
+from pipelines.operations.audit_run import audit_run
 from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.loaders.config import OrderConfig, Remainder, SourceConfig
 from wsm_data.loaders.ledger.writer import LedgerWriter

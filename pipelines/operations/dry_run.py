@@ -3,14 +3,14 @@
 import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
 
 import typer
 
 from pipelines.registry import load_stage
-from pipelines.running.runner import RunOptions, run_stage
+from pipelines.running.options import RunOptions
+from pipelines.running.runner import run_stage
 from pipelines.running.settings import config_json, input_fields
-from pipelines.running.stage import Stage
+from pipelines.running.stage import ConfigT, Stage
 from pipelines.running.stage_report import StageReport, summary_table
 from pipelines.running.upstream import UpstreamMissing
 from wsm_data.shards.names import MANIFEST_NAME
@@ -18,7 +18,7 @@ from wsm_data.shards.names import MANIFEST_NAME
 _SHOWN_UNITS = 20
 
 
-def show_stage(stage: Stage[Any], config: Any, out: Path, options: RunOptions) -> None:
+def show_stage(stage: Stage[ConfigT], config: ConfigT, out: Path, options: RunOptions) -> None:
     """Print the settings of one stage and what it would do."""
     _show_settings(stage.name, config)
     report = run_stage(stage, config, out, options)
@@ -26,7 +26,7 @@ def show_stage(stage: Stage[Any], config: Any, out: Path, options: RunOptions) -
     typer.echo(summary_table([report]))
 
 
-def show_run(configs: Mapping[str, Any], out: Path, first: RunOptions, others: RunOptions) -> None:
+def show_run(configs: Mapping[str, object], out: Path, first: RunOptions, others: RunOptions) -> None:
     """Print the settings of every stage of a run, then what each would do that can be planned already.
 
     Args:
@@ -55,7 +55,7 @@ def show_run(configs: Mapping[str, Any], out: Path, first: RunOptions, others: R
     typer.echo(summary_table(reports))
 
 
-def _plan(name: str, config: Any, out: Path, options: RunOptions, waiting: bool) -> StageReport | None:
+def _plan(name: str, config: object, out: Path, options: RunOptions, waiting: bool) -> StageReport | None:
     """What a stage would do; None where only a stage that has yet to run can tell."""
     try:
         return run_stage(load_stage(name), config, out / name, options)
@@ -65,7 +65,7 @@ def _plan(name: str, config: Any, out: Path, options: RunOptions, waiting: bool)
         return None
 
 
-def _awaits_input(config: Any, stages: Iterable[str], out: Path) -> bool:
+def _awaits_input(config: object, stages: Iterable[str], out: Path) -> bool:
     """Whether an input that the run makes itself is not there yet; a release is there when its manifest is."""
     for name in input_fields(config):
         path = Path(str(getattr(config, name)))
@@ -75,7 +75,7 @@ def _awaits_input(config: Any, stages: Iterable[str], out: Path) -> bool:
     return False
 
 
-def _show_settings(name: str, config: Any) -> None:
+def _show_settings(name: str, config: object) -> None:
     typer.echo(f"{name}: settings\n{json.dumps(config_json(config), indent=2)}")
 
 

@@ -1,28 +1,20 @@
 """`wsm run`: stages in their order, in one folder, again and beside."""
 
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import pytest
 from fake_wsm import use_fake_stages
 
 from pipelines import recipe, registry
-from pipelines.cli import _OPTIONS
-from pipelines.commands.stages import run_one, run_recipe
+from pipelines.operations.run_recipe import run_recipe
 from pipelines.running.folder import read_stage_record, write_stage_record
-from pipelines.running.runner import RunOptions
+from pipelines.running.options import RunOptions, StageRequest
 from wsm_data.errors import ConfigError
 
-OPTIONS = {
-    "workers": 1,
-    "engine": "local",
-    "limit": 0,
-    "only": None,
-    "dry_run": False,
-    "max_refused": 0.1,
-    "fork": False,
-    "retry_refused": False,
-    "quiet": True,
-}
+
+def request(out, *assignments, **options):
+    """A request for one worker, with some options."""
+    return StageRequest(out=out, assignments=assignments, options=RunOptions(quiet=True, **options))
 
 
 @pytest.fixture(autouse=True)
@@ -40,7 +32,7 @@ def run(tmp_path, source, calls):
     path.write_text(f'stages = ["copy", "join"]\n[copy]\nsource = "{source}"\n')
 
     def go(*assignments, **options):
-        run_recipe(str(path), tmp_path / "run", None, assignments, **{**OPTIONS, **options})
+        run_recipe(str(path), request(tmp_path / "run", *assignments, **options))
         return calls()
 
     return go
@@ -59,7 +51,7 @@ def test_the_second_run_does_nothing(run):
 
 
 def test_a_selection_narrows_the_first_stage_and_the_others_take_what_there_is(run, tmp_path):
-    assert run(only=["b*"]) == ["b1", "finish"]
+    assert run(only=("b*",)) == ["b1", "finish"]
     assert (tmp_path / "run" / "join" / "b1").exists()
     assert run() == ["a1", "a2", "finish"]
     assert (tmp_path / "run" / "join" / "a1").exists()
@@ -128,27 +120,28 @@ def test_a_stage_that_ended_is_told_of_although_a_later_one_fails(run, tmp_path,
 
 def test_a_selection_of_nothing_is_refused(run, tmp_path):
     with pytest.raises(ConfigError, match=r"--only z\* matches none of 3 units; ids look like a1"):
-        run(only=["a*", "z*"])
+        run(only=("a*", "z*"))
     assert not (tmp_path / "run").exists()
 
 
-def test_all_missing_inputs_of_a_stage_are_named_at_once(tmp_path):
-    with pytest.raises(ConfigError, match=r"add --set copy=FOLDER$"):
-        run_one("join", tmp_path / "join", None, None, **{**OPTIONS, "dry_run": True})
-    with pytest.raises(ConfigError, match="unknown key cpoy; did you mean copy"):
-        run_one("join", tmp_path / "join", None, ["cpoy=x"], **OPTIONS)
-
-
-def test_the_defaults_of_the_command_line_are_those_of_the_options():
-    told = {name: default for name, (_, default) in _OPTIONS.items()}
-    for field in fields(RunOptions):
-        if field.name != "workers":  # 0 of the command line stands for one a core
-            assert told[field.name] == field.default or not (told[field.name] or field.default)
-
-
-def test_changed_settings_stop_the_run_before_anything_is_written(run, tmp_path):
+@pytest.mark.parametrize("dry_run", [True, False])
+def test_changed_settings_of_any_stage_stop_the_run_before_its_first_stage(run, tmp_path, source, dry_run):
     run()
-    with pytest.raises(ConfigError, match="repeat: 1 -> 2"):
+    folder = tmp_path / "run" / "join"
+    write_stage_record(folder, replace(read_stage_record(folder), version=7, fingerprint="of version 7"))
+    (source / "a1.txt").write_text("changed")  # so that `copy` has something to do
+    with pytest.raises(
+        ConfigError, match="join was written with other settings of `wsm join`:\n  version of the stage: 7 -> 1"
+    ):
+        run(dry_run=dry_run)
+    assert (tmp_path / "run" / "copy" / "copies" / "a1.txt").read_text() == "text of a1"
+
+
+def test_the_changed_settings_of_all_stages_are_named_at_once(run, tmp_path):
+    run()
+    folder = tmp_path / "run" / "join"
+    write_stage_record(folder, replace(read_stage_record(folder), version=7, fingerprint="of version 7"))
+    with pytest.raises(ConfigError, match=r"repeat: 1 -> 2\n(.*\n)*.*version of the stage: 7 -> 1"):
         run("copy.repeat=2")
 
 
@@ -168,5 +161,5 @@ def test_a_codec_that_cannot_begin_stops_the_run_before_its_first_stage(tmp_path
     monkeypatch.undo()  # the real stages
     words = ["source=absent", f"encode.codec.weights={tmp_path / 'vae'}"]
     with pytest.raises(ConfigError, match="codec dct has no weights"):
-        run_recipe("interndata", tmp_path / "run", None, words, **OPTIONS)
+        run_recipe("interndata", request(tmp_path / "run", *words))
     assert not (tmp_path / "run").exists()

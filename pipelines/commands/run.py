@@ -1,0 +1,68 @@
+"""`wsm run` and `wsm demo`: the stages of a recipe, in one run folder."""
+
+from typing import Annotated
+
+import typer
+
+from pipelines.commands.command import Command
+from pipelines.commands.options import (
+    Assignments,
+    Config,
+    DryRun,
+    Engine,
+    Fork,
+    Limit,
+    MaxRefused,
+    Only,
+    Out,
+    Quiet,
+    RetryRefused,
+    Workers,
+)
+from pipelines.commands.stage_options import REQUEST, RUN, filling, stage_request
+from pipelines.recipe import recipe_summaries
+from pipelines.running.options import StageRequest
+
+
+def run_recipe(
+    recipe: Annotated[str, typer.Argument(metavar="RECIPE", help="Name of a recipe, or path of a TOML file.")],
+    out: Out,
+    config: Config = REQUEST.config,
+    assignments: Assignments = None,
+    workers: Workers = RUN.workers,
+    engine: Engine = REQUEST.engine,
+    limit: Limit = RUN.limit,
+    only: Only = None,
+    dry_run: DryRun = RUN.dry_run,
+    max_refused: MaxRefused = RUN.max_refused,
+    fork: Fork = RUN.fork,
+    retry_refused: RetryRefused = RUN.retry_refused,
+    quiet: Quiet = RUN.quiet,
+) -> None:
+    """Run the stages of any recipe."""
+    request = stage_request(
+        out, config, assignments, workers, engine, limit, only, dry_run, max_refused, fork, retry_refused, quiet
+    )
+    _run(recipe, request)
+
+
+def run_demo(request: StageRequest) -> None:
+    """Run the recipe that generates its own data."""
+    _run("demo", request)
+
+
+def _run(recipe: str, request: StageRequest) -> None:
+    from pipelines.operations.run_recipe import run_recipe as work
+
+    work(recipe, request)
+
+
+def _recipe_list() -> str:
+    """The recipes of the project, one a line; the first line keeps click from wrapping them."""
+    return "\n".join(["\b", "Recipes:", *(f"  {name}: {summary}" for name, summary in recipe_summaries().items())])
+
+
+RUN_COMMAND = Command(
+    name="run", summary="Run the stages of a recipe into one run folder.", call=run_recipe, epilog=_recipe_list()
+)
+DEMO_COMMAND = Command(name="demo", summary="The main job, end to end, on generated data.", call=filling(run_demo))

@@ -1,0 +1,40 @@
+"""`wsm verify` without a folder: every byte is read, and nothing is recorded."""
+
+from dataclasses import fields
+
+import typer
+
+from pipelines.running.options import RunOptions, StageRequest
+from pipelines.stages.verify import require_sound
+from wsm_data.errors import ConfigError
+
+
+def verify_without_record(release: str, request: StageRequest) -> None:
+    """Prove that a release is whole.
+
+    Raises:
+        ConfigError: an option is given that would do nothing.
+        IntegrityError: lists what is damaged, by shard and clip.
+    """
+    _refuse_unused(request)
+    clips = require_sound(release, request.options.quiet)
+    typer.echo(f"{release} is whole: {clips} clips, every byte and every trajectory accounted for")
+
+
+def _refuse_unused(request: StageRequest) -> None:
+    """There are neither settings nor units: only `quiet` counts."""
+    unset = StageRequest()
+    given = [
+        field.name
+        for field in fields(RunOptions)
+        if field.name != "quiet" and getattr(request.options, field.name) != getattr(unset.options, field.name)
+    ]
+    given += ["engine"] if request.engine != unset.engine else []
+    given += ["config"] if request.config else []
+    given += ["set"] if request.assignments else []
+    if given:
+        words = ", ".join(f"--{name.replace('_', '-')}" for name in given)
+        raise ConfigError(
+            f"without --out the whole release is read and nothing is recorded, so {words} would do nothing: leave that "
+            "out, or add --out FOLDER"
+        )
