@@ -30,7 +30,9 @@ ONLY_IMPORTED_IN = {
     "matplotlib": ("wsm_data/view/",),
     "jinja2": ("wsm_data/view/",),
     # the peers we are measured against belong to bench/
+    "casadi": (),
     "embreex": (),
+    "evo": (),
     "isal": (),
     "plyfile": (),
     "skfmm": (),
