@@ -1,8 +1,8 @@
-"""Opening a release, planning an epoch and finding the first clips, from ten thousand to ten million clips.
+"""Opening a release, ordering an epoch and finding the first clips, from ten thousand to ten million clips.
 
 The releases are generated, without shards: clips of about 2 MB in shards of 512 MB, random checksums and digests. Every
-measurement is a process of its own; imports are left out, except those of packing (numba), which the plan makes.
-Goals at ten million clips: open in 2 s, plan in 2 s, all of it within 1.5 GB. Run as `python bench/index_scale.py`.
+measurement is a process of its own; imports are left out, except those of joining clips (numba), which the order makes.
+Goals at ten million clips: open in 2 s, order in 2 s, all of it within 1.5 GB. Run as `python bench/index_scale.py`.
 """
 
 import argparse
@@ -19,7 +19,7 @@ from generated_index import generate_release
 from reporting import machine, machine_line, table, write_results
 
 from wsm_data.loaders.config import Arrangement, OrderConfig, SourceConfig
-from wsm_data.loaders.order.epoch_plan import EpochPlan, chunk_sizes, plan_epoch
+from wsm_data.loaders.order.epoch_order import EpochOrder, chunk_sizes, order_epoch
 from wsm_data.loaders.reading.clip_places import clip_places
 from wsm_data.loaders.sources.clips import Sources, open_sources
 from wsm_data.shards.names import INDEX_NAME
@@ -31,13 +31,13 @@ WORLD_SIZE = 8
 ORDERS = {
     "shuffled": OrderConfig(global_batch=GLOBAL_BATCH),
     "bucket": OrderConfig(global_batch=GLOBAL_BATCH, arrangement=Arrangement.BUCKET),
-    "pack": OrderConfig(global_batch=GLOBAL_BATCH, arrangement=Arrangement.PACK, row_latents=128, pool=256),
+    "join": OrderConfig(global_batch=GLOBAL_BATCH, arrangement=Arrangement.JOIN, row_latents=128, pool=256),
 }
 STEPS = {
     "open_s": "open, digest of the index compared, s",
     "open_gb": "peak memory, GB",
-    "plan_s": "plan of an epoch, s",
-    "plan_gb": "peak memory, GB",
+    "order_s": "order of an epoch, s",
+    "order_gb": "peak memory, GB",
     "refs_ms": "refs of the first batch, ms",
     "batch_s": "their keys, places and checksums, s",
     "batch_gb": "peak memory, GB",
@@ -50,11 +50,11 @@ def measure(release: str, order: OrderConfig) -> dict[str, float]:
     numbers: dict[str, float] = {}
     sources = _timed(numbers, "open_s", lambda: open_sources([SourceConfig(release=release)]))
     numbers["open_gb"] = _peak_gb()
-    plan = _timed(numbers, "plan_s", lambda: plan_epoch(sources.layouts, order, epoch=0))
-    numbers["plan_gb"] = _peak_gb()
-    refs = _timed(numbers, "refs_ms", lambda: _first_refs(plan))
+    epoch_order = _timed(numbers, "order_s", lambda: order_epoch(sources.layouts, order, epoch=0))
+    numbers["order_gb"] = _peak_gb()
+    refs = _timed(numbers, "refs_ms", lambda: _first_refs(epoch_order))
     numbers["refs_ms"] *= 1000
-    _timed(numbers, "batch_s", lambda: _facts(sources, plan, refs))
+    _timed(numbers, "batch_s", lambda: _facts(sources, epoch_order, refs))
     numbers["batch_gb"] = _peak_gb()
     [key] = sources.keys(refs[-1:])
     row = _timed(numbers, "key_s", lambda: sources.tables[0].release.index.row(key))
@@ -62,14 +62,14 @@ def measure(release: str, order: OrderConfig) -> dict[str, float]:
     return numbers
 
 
-def _first_refs(plan: EpochPlan) -> np.ndarray:
-    return np.concatenate(plan.rows(0, WORLD_SIZE // 2, WORLD_SIZE))
+def _first_refs(epoch_order: EpochOrder) -> np.ndarray:
+    return np.concatenate(epoch_order.rows(0, WORLD_SIZE // 2, WORLD_SIZE))
 
 
-def _facts(sources: Sources, plan: EpochPlan, refs: np.ndarray) -> None:
+def _facts(sources: Sources, epoch_order: EpochOrder, refs: np.ndarray) -> None:
     """What a rank needs of its clips before it reads them."""
     places = clip_places(sources, refs)
-    chunk_sizes(refs, plan.order, plan.epoch)
+    chunk_sizes(refs, epoch_order.config, epoch_order.epoch)
     assert len({place.key for place in places}) == len(refs)
 
 
@@ -127,15 +127,15 @@ def _cells(sizes: list[dict], order: str, step: str) -> list[str]:
 
 def _page(sizes: list[dict], about: dict[str, object]) -> list[str]:
     header = ["", *(f"{size['clips']:,} clips" for size in sizes), "last tenfold"]
-    lines = ["# Opening and planning, from ten thousand to ten million clips", "", *__doc__.splitlines()[2:], ""]
+    lines = ["# Opening and ordering, from ten thousand to ten million clips", "", *__doc__.splitlines()[2:], ""]
     lines += [f"Machine: {machine_line(about)} Medians of {ROUNDS} processes, least and most in brackets.", ""]
     for order in ORDERS:
         rows = [["index, MB", *(f"{size['index_mb']:.1f}" for size in sizes), ""]]
         rows += [[name, *_cells(sizes, order, step)] for step, name in STEPS.items()]
         settings = ORDERS[order]
-        packed = f", rows of {settings.row_latents} latents" if settings.row_latents else ""
+        joined = f", rows of {settings.row_latents} latents" if settings.row_latents else ""
         lines += [
-            f"## {order}: global batch {GLOBAL_BATCH}, pool {settings.pool}{packed}",
+            f"## {order}: global batch {GLOBAL_BATCH}, pool {settings.pool}{joined}",
             "",
             *table(header, rows),
             "",

@@ -22,7 +22,7 @@ import numpy as np
 from reporting import RESULTS, machine, machine_line, table, write_results
 
 from wsm_data.loaders.config import OrderConfig
-from wsm_data.loaders.order.epoch_plan import plan_epoch
+from wsm_data.loaders.order.epoch_order import order_epoch
 from wsm_data.loaders.order.pass_order import SourceLayout
 
 matplotlib.use("Agg")
@@ -50,8 +50,8 @@ MEASURES = (
 
 def steps_of(layout: SourceLayout, order: OrderConfig, epoch: int) -> np.ndarray:
     """Clips by step and slot, int64 [steps, batch]."""
-    plan = plan_epoch([layout], order, epoch)
-    return plan.refs[plan.slots].T
+    epoch_order = order_epoch([layout], order, epoch)
+    return epoch_order.refs[epoch_order.slots].T
 
 
 def pairs_kept(steps: np.ndarray, before: np.ndarray) -> float:

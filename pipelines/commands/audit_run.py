@@ -1,4 +1,4 @@
-"""`wsm audit-run`: the proof that a run saw each clip as often as its plan says."""
+"""`wsm audit-run`: the proof that a run saw each clip as often as its order says."""
 
 from pathlib import Path
 from typing import Annotated

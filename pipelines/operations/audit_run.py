@@ -1,4 +1,4 @@
-"""`wsm audit-run`: the proof that a run saw each clip as often as its plan says, and when it saw which."""
+"""`wsm audit-run`: the proof that a run saw each clip as often as its order says, and when it saw which."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -116,7 +116,7 @@ def _head(timeline: Timeline) -> str:
 
 
 def _epoch_table(audits: Sequence[EpochAudit]) -> str:
-    rows = [("epoch", "steps", "of", "clips seen", "once", "more often", "never", "explained by the plan")]
+    rows = [("epoch", "steps", "of", "clips seen", "once", "more often", "never", "explained by the order")]
     for audit in audits:
         steps = (f"{audit.epoch:,}", f"{audit.recorded:,}", f"{audit.steps:,}", f"{audit.delivered:,}")
         times = (f"{audit.seen_once:,}", f"{audit.seen_more:,}", f"{audit.never:,}")
@@ -130,9 +130,9 @@ def _explained(audit: EpochAudit) -> str:
     if not audit.complete:
         return "not complete"
     parts = (
-        ("dropped clips", audit.plan.dropped_clips),
-        ("repeated rows", audit.plan.repeated_rows),
-        ("empty rows", audit.plan.padded_rows),
+        ("dropped clips", audit.summary.dropped_clips),
+        ("repeated rows", audit.summary.repeated_rows),
+        ("empty rows", audit.summary.padded_rows),
     )
     return ", ".join(f"{words}: {count:,}" for words, count in parts if count) or "every clip"
 
@@ -142,5 +142,5 @@ def _verdict(audits: Sequence[EpochAudit], beginning: str) -> str:
     since = f" from {beginning} on" if beginning else ""
     return (
         f"{len(complete)} of {len(audits)} epochs complete, no step missing{since}, none twice: every recorded step "
-        "brought what the plan says"
+        "brought what the order says"
     )

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from wsm_data.loaders.config import OrderConfig
-from wsm_data.loaders.order.epoch_plan import chunk_sizes, plan_epoch
+from wsm_data.loaders.order.epoch_order import chunk_sizes, order_epoch
 from wsm_data.loaders.order.pass_order import SourceLayout
 from wsm_data.loaders.sources.queries import draw_replan_latents
 
@@ -23,7 +23,7 @@ SETTINGS = {
     "plain, in order, pad": {"shuffle": False, "remainder": "pad"},
     "plain, blocks of 8, repeat": {"block_clips": 8, "window_blocks": 3, "remainder": "repeat"},
     "bucket": {"arrangement": "bucket", "pool": 4},
-    "pack": {"arrangement": "pack", "row_latents": 40, "pool": 16, "max_latents": 20, "remainder": "pad"},
+    "join": {"arrangement": "join", "row_latents": 40, "pool": 16, "max_latents": 20, "remainder": "pad"},
 }
 CASES = list(product(SETTINGS, (0, 7, (1 << 64) - 1), (1, 2, 8)))
 
@@ -33,9 +33,9 @@ def digest_of_epochs(settings, seed, world_size):
     order = OrderConfig(seed=seed, global_batch=8, **SETTINGS[settings])
     digest = hashlib.sha256()
     for epoch in range(3):
-        plan = plan_epoch(SOURCES, order, epoch)
-        for step, rank in product(range(plan.steps), range(world_size)):
-            for refs in plan.rows(step, rank, world_size):
+        epoch_order = order_epoch(SOURCES, order, epoch)
+        for step, rank in product(range(epoch_order.steps), range(world_size)):
+            for refs in epoch_order.rows(step, rank, world_size):
                 row = [refs.tolist(), chunk_sizes(refs, order, epoch).tolist()]
                 digest.update(f"{epoch} {step} {rank} {row}\n".encode())
     return digest.hexdigest()

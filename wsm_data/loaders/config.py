@@ -27,7 +27,7 @@ class Arrangement(StrEnum):
 
     PLAIN = "plain"
     BUCKET = "bucket"
-    PACK = "pack"
+    JOIN = "join"
 
 
 class Verify(StrEnum):
@@ -76,10 +76,10 @@ class OrderConfig:
         remainder: what becomes of rows that do not fill a step.
         max_latents: longest sequence, in latents; longer clips are cut to a prefix. 0: whole clips.
         arrangement: one clip a row (`plain`), rows of similar length in a step (`bucket`), or several clips in rows of
-            `row_latents` (`pack`).
-        pool: how far `bucket` and `pack` look ahead, in units of their own. `bucket`: so many global steps, whose rows
-            it sorts by length. `pack`: so many clips, among which it looks for what fits. `plain` has no use for it.
-        row_latents: length of a packed row, in latents; only for `pack`.
+            `row_latents` (`join`; elsewhere called sequence packing).
+        pool: how far `bucket` and `join` look ahead, in units of their own. `bucket`: so many global steps, whose rows
+            it sorts by length. `join`: so many clips, among which it looks for what fits. `plain` has no use for it.
+        row_latents: length of a row of joined clips, in latents; only for `join`.
         chunk_sizes: what the chunk size K is drawn from, once for every sequence.
     """
 
@@ -106,8 +106,8 @@ class OrderConfig:
                 raise ValueError(f"{name} must not be negative, found {getattr(self, name)}")
         if self.seed >= 1 << 64:
             raise ValueError(f"seed must be below 2^64, found {self.seed}")
-        if (self.arrangement is Arrangement.PACK) != (self.row_latents > 0):
-            raise ValueError("row_latents belongs to arrangement = pack, and must be above 0 there")
+        if (self.arrangement is Arrangement.JOIN) != (self.row_latents > 0):
+            raise ValueError("row_latents belongs to arrangement = join, and must be above 0 there")
         if not self.chunk_sizes or min(self.chunk_sizes) < 1:
             raise ValueError(f"chunk_sizes must be numbers of at least 1, found {self.chunk_sizes}")
 

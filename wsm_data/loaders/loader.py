@@ -1,4 +1,4 @@
-"""The loader: batches of one rank in the order of the plan, from where the state says, and a state to go on from."""
+"""The loader: batches of one rank in the order of the epoch, from where the state says, and a state to go on from."""
 
 import os
 import time
@@ -15,7 +15,7 @@ from wsm_data.loaders.batches.batch import Batch, PackedBatch
 from wsm_data.loaders.batches.transfer import hand_over, open_transfer
 from wsm_data.loaders.config import LoaderConfig
 from wsm_data.loaders.ledger.writer import LedgerWriter
-from wsm_data.loaders.order.epoch_plan import EpochPlan, PlanReport, rows_per_rank
+from wsm_data.loaders.order.epoch_order import EpochOrder, EpochSummary, rows_per_rank
 from wsm_data.loaders.ranks import place_among_ranks
 from wsm_data.loaders.reading.step_reader import StepReader
 from wsm_data.loaders.reading.stream import BatchStream, Delivered, open_stream
@@ -70,7 +70,7 @@ class ClipLoader(torch.utils.data.IterableDataset[Batch]):
         self._process = os.getpid()
         self._template = loader_state(self._sources, config.order, epoch=0, step=0)
         self._ledger = self._open_ledger()
-        self._plan: EpochPlan | None = None
+        self._epoch_order: EpochOrder | None = None
         self._epoch, self._step = 0, 0
         self._turn = 0
         self._running: BatchStream[Any] | None = None
@@ -86,26 +86,26 @@ class ClipLoader(torch.utils.data.IterableDataset[Batch]):
         return self._sources
 
     @property
-    def plan(self) -> EpochPlan:
-        """The plan of the current epoch.
+    def epoch_order(self) -> EpochOrder:
+        """The order of the current epoch.
 
         Raises:
-            ConfigError: the epoch has no step, or a clip does not fit into a packed row.
+            ConfigError: the epoch has no step, or a clip does not fit into a row.
         """
-        if self._plan is None or self._plan.epoch != self._epoch:
-            self._plan = None  # its memory is free before the next one takes as much
-            self._plan = self._sources.plan(self._config.order, self._epoch)
-        return self._plan
+        if self._epoch_order is None or self._epoch_order.epoch != self._epoch:
+            self._epoch_order = None  # its memory is free before the next one takes as much
+            self._epoch_order = self._sources.order_epoch(self._config.order, self._epoch)
+        return self._epoch_order
 
     @property
     def steps(self) -> int:
         """Global steps of the current epoch, the same on every rank."""
-        return self.plan.steps
+        return self.epoch_order.steps
 
     @property
-    def report(self) -> PlanReport:
+    def summary(self) -> EpochSummary:
         """What becomes of the clips in the current epoch."""
-        return self.plan.report
+        return self.epoch_order.summary
 
     def state_dict(self) -> dict[str, Any]:
         """The place behind the last batch that was delivered, as JSON; what was read ahead does not count."""
@@ -198,7 +198,7 @@ class ClipLoader(torch.utils.data.IterableDataset[Batch]):
         if self._ledger is not None:
             self._ledger.begin(self._epoch, self._step, self.steps)
         stream = open_stream(
-            self._reader, finish, self.plan, steps, self._config.read, self.timing, inline=worker is not None
+            self._reader, finish, self.epoch_order, steps, self._config.read, self.timing, inline=worker is not None
         )
         self._running = stream
         return stream

@@ -1,4 +1,4 @@
-"""The loader of post-training: queries in the order of a plan, each with its history, its map and its goal."""
+"""The loader of post-training: queries in the order of the epoch, each with its history, its map and its goal."""
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
@@ -18,7 +18,7 @@ from wsm_data.loaders.batches.batch import POSE_SLOTS, Batch
 from wsm_data.loaders.batches.query_batch import QueryBatch
 from wsm_data.loaders.config import LoaderConfig, ReadConfig
 from wsm_data.loaders.loader import ClipLoader
-from wsm_data.loaders.order.epoch_plan import PlanReport
+from wsm_data.loaders.order.epoch_order import EpochSummary
 from wsm_data.loaders.reading.verification import verification_of
 from wsm_data.loaders.sources.queries import QueryConfig, QuerySources, open_queries
 from wsm_data.schema.clip import TEMPORAL_RATIO, UNREACHABLE_MM
@@ -76,9 +76,9 @@ class QueryLoader(torch.utils.data.IterableDataset[QueryBatch]):
         return self._histories.steps
 
     @property
-    def report(self) -> PlanReport:
+    def summary(self) -> EpochSummary:
         """What becomes of the queries in the current epoch; `clips` counts queries."""
-        return self._histories.report
+        return self._histories.summary
 
     def state_dict(self) -> dict[str, Any]:
         """The place behind the last batch that was delivered, as JSON."""

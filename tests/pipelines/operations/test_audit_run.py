@@ -17,16 +17,16 @@ ORDER = OrderConfig(seed=2, global_batch=2, remainder=Remainder.DROP)
 
 
 def record(folder, release, spans, *, world_size=2, order=ORDER, change=lambda refs: refs):
-    """A session that records the steps `first` to `last` of some epochs, as their plan says."""
+    """A session that records the steps `first` to `last` of some epochs, as their order says."""
     sources = open_sources([SourceConfig(release=str(release), split="")])
     identity = {"sources": sources.identity(), "order": asdict(order)}
     for rank in range(world_size):
         with LedgerWriter(folder, identity, rank, world_size) as writer:
             for epoch, first, last in spans:
-                plan = sources.plan(order, epoch)
-                writer.begin(epoch, first, plan.steps)
+                epoch_order = sources.order_epoch(order, epoch)
+                writer.begin(epoch, first, epoch_order.steps)
                 for step in range(first, last):
-                    writer.record(epoch, step, change(np.concatenate(plan.rows(step, rank, world_size))))
+                    writer.record(epoch, step, change(np.concatenate(epoch_order.rows(step, rank, world_size))))
     return sources
 
 
@@ -50,7 +50,7 @@ def test_a_run_that_was_killed_and_resumed_is_proven(resumed, tiny, capsys):
     assert re.search(r"0 +3 +3 +6 +6 +0 +1 +dropped clips: 1", printed)
     assert "epoch 0: step 1 of session" in printed
     assert printed.splitlines()[-1] == (
-        "2 of 2 epochs complete, no step missing, none twice: every recorded step brought what the plan says"
+        "2 of 2 epochs complete, no step missing, none twice: every recorded step brought what the order says"
     )
 
 
@@ -120,7 +120,7 @@ def test_a_run_of_which_no_step_counts_proves_nothing(tmp_path, tiny):
 
 def test_it_says_which_steps_saw_a_clip(resumed, tiny, capsys):
     sources = open_sources([SourceConfig(release=str(tiny.folder), split="")])
-    [key] = sources.keys(sources.plan(ORDER, 0).rows(1, 1, 2)[0])  # of step 1, which was trained again
+    [key] = sources.keys(sources.order_epoch(ORDER, 0).rows(1, 1, 2)[0])  # of step 1, which was trained again
     audit(resumed, releases=[str(tiny.folder)], clip=key)
     rows = [line.split() for line in capsys.readouterr().out.splitlines()[1:]]
     assert [row[:4] for row in rows if row[0] == "0"] == [["0", "1", "1", "2"], ["0", "1", "0", "1"]]
@@ -130,7 +130,7 @@ def test_it_says_which_steps_saw_a_clip(resumed, tiny, capsys):
 
 def test_a_clip_that_was_not_delivered_is_said(tmp_path, tiny, capsys):
     sources = record(tmp_path / "ledger", tiny.folder, [(0, 0, 1)])
-    seen = np.concatenate(sources.plan(ORDER, 0).rows(0, 0, 1)).tolist()
+    seen = np.concatenate(sources.order_epoch(ORDER, 0).rows(0, 0, 1)).tolist()
     unseen = sources.keys([ref for ref in range(sources.clips) if ref not in seen])[0]
     audit(tmp_path / "ledger", releases=[str(tiny.folder)], clip=unseen)
     assert capsys.readouterr().out == f"{unseen} was not delivered at any recorded step\n"
@@ -139,7 +139,7 @@ def test_a_clip_that_was_not_delivered_is_said(tmp_path, tiny, capsys):
 def test_it_says_what_a_step_brought(resumed, tiny, capsys):
     audit(resumed, releases=[str(tiny.folder)], epoch=1, step=2)
     sources = open_sources([SourceConfig(release=str(tiny.folder), split="")])
-    refs = np.concatenate(sources.plan(ORDER, 1).rows(2, 0, 1)).tolist()
+    refs = np.concatenate(sources.order_epoch(ORDER, 1).rows(2, 0, 1)).tolist()
     keys = sources.keys(refs)
     expected = [["0", str(ref), key] for ref, key in zip(refs, keys, strict=True)]
     assert [line.split() for line in capsys.readouterr().out.splitlines()[1:]] == expected

@@ -44,10 +44,10 @@ def test_these_numbers_of_an_order_are_not_negative(name):
         OrderConfig(**{name: -1})
 
 
-def test_rows_have_a_length_where_they_are_packed_and_nowhere_else():
-    OrderConfig(arrangement=Arrangement.PACK, row_latents=16)
-    for arrangement, row_latents in ((Arrangement.PACK, 0), (Arrangement.PLAIN, 16), (Arrangement.BUCKET, 16)):
-        with pytest.raises(ValueError, match="row_latents belongs to arrangement = pack"):
+def test_rows_have_a_length_where_clips_are_joined_and_nowhere_else():
+    OrderConfig(arrangement=Arrangement.JOIN, row_latents=16)
+    for arrangement, row_latents in ((Arrangement.JOIN, 0), (Arrangement.PLAIN, 16), (Arrangement.BUCKET, 16)):
+        with pytest.raises(ValueError, match="row_latents belongs to arrangement = join"):
             OrderConfig(arrangement=arrangement, row_latents=row_latents)
 
 

@@ -23,12 +23,12 @@ def _refs(loader: ClipLoader, count: int | None = None) -> list[list[int]]:
     return [batch.refs.tolist() for batch in islice(loader, count)]
 
 
-def test_an_epoch_is_the_plan_and_the_next_one_follows(make_loader):
+def test_an_epoch_is_as_ordered_and_the_next_one_follows(make_loader):
     loader = make_loader()
     for epoch in range(3):
-        planned = [np.concatenate(loader.plan.rows(step, 0, 1)).tolist() for step in range(loader.steps)]
+        ordered = [np.concatenate(loader.epoch_order.rows(step, 0, 1)).tolist() for step in range(loader.steps)]
         batches = [(batch.epoch, batch.step, batch.refs.tolist()) for batch in loader]
-        assert batches == [(epoch, step, refs) for step, refs in enumerate(planned)]
+        assert batches == [(epoch, step, refs) for step, refs in enumerate(ordered)]
         assert loader.state_dict()["epoch"] == epoch + 1
 
 

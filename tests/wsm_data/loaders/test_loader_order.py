@@ -12,7 +12,7 @@ from wsm_data.loaders.loader import ClipLoader
 MakeLoader = Callable[..., ClipLoader]
 WORLD_SIZES = (1, 2, 3, 4, 6)
 ORDER = {"global_batch": 12, "seed": 5, "remainder": Remainder.REPEAT, "standardise": False, "dtype": "float16"}
-PACKED = ORDER | {"global_batch": 6, "arrangement": Arrangement.PACK, "row_latents": 7, "remainder": Remainder.PAD}
+JOINED = ORDER | {"global_batch": 6, "arrangement": Arrangement.JOIN, "row_latents": 7, "remainder": Remainder.PAD}
 SHORT = ORDER | {"global_batch": 6, "remainder": Remainder.DROP}
 EPOCHS = 2
 
@@ -47,7 +47,7 @@ def _ranks(make_loader: MakeLoader, world_size: int, settings: dict[str, object]
     return [make_loader(rank=rank, world_size=world_size, **settings) for rank in range(world_size)]
 
 
-@pytest.mark.parametrize("settings", [ORDER, PACKED, SHORT], ids=["repeat", "packed", "drop"])
+@pytest.mark.parametrize("settings", [ORDER, JOINED, SHORT], ids=["repeat", "join", "drop"])
 def test_every_world_size_sees_the_same_clips_in_the_same_order(make_loader, settings):
     expected = _run(_ranks(make_loader, 1, settings | {"threads": 0}))
     assert len(expected) >= 2 * EPOCHS
@@ -60,12 +60,12 @@ def test_every_world_size_sees_the_same_clips_in_the_same_order(make_loader, set
 @pytest.mark.parametrize("threads", [0, 1, 4])
 @pytest.mark.parametrize("prefetch_batches", [1, 2, 7])
 def test_threads_and_prefetch_change_neither_order_nor_content(make_loader, threads, prefetch_batches):
-    expected = [_content(batch) for batch in make_loader(**PACKED, threads=0, verify="never")]
-    loader = make_loader(**PACKED, threads=threads, prefetch_batches=prefetch_batches)
+    expected = [_content(batch) for batch in make_loader(**JOINED, threads=0, verify="never")]
+    loader = make_loader(**JOINED, threads=threads, prefetch_batches=prefetch_batches)
     assert [_content(batch) for batch in loader] == expected
 
 
-@pytest.mark.parametrize("settings", [ORDER, PACKED], ids=["repeat", "packed"])
+@pytest.mark.parametrize("settings", [ORDER, JOINED], ids=["repeat", "join"])
 def test_a_run_resumes_at_every_step_on_any_other_world_size(make_loader, settings):
     states: list[dict[str, object]] = []
     expected = _run(_ranks(make_loader, 1, settings | {"threads": 1}), states)
@@ -96,7 +96,7 @@ def test_an_interrupted_epoch_goes_on_with_fewer_ranks_and_again_with_more(make_
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("settings", [ORDER, PACKED | {"global_batch": 12}], ids=["repeat", "packed"])
+@pytest.mark.parametrize("settings", [ORDER, JOINED | {"global_batch": 12}], ids=["repeat", "join"])
 @pytest.mark.parametrize("threads", [1, 4])
 @pytest.mark.parametrize("world_size", WORLD_SIZES)
 def test_all_combinations_resumed_at_every_step(make_loader, settings, threads, world_size):
@@ -115,6 +115,6 @@ def test_all_combinations_resumed_at_every_step(make_loader, settings, threads, 
 
 
 def test_nothing_is_lost_or_twice_in_an_epoch(make_loader, released):
-    loader = make_loader(**PACKED)
+    loader = make_loader(**JOINED)
     seen = np.concatenate([batch.refs.numpy() for batch in loader])
     assert sorted(seen.tolist()) == list(range(len(released.clips)))

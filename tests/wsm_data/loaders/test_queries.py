@@ -55,7 +55,7 @@ def seen(batches):
 @pytest.mark.parametrize("arrangement", list(Arrangement))
 def test_a_query_is_a_prefix_of_its_clip_with_its_map(driven, arrangement):
     release, clips = driven
-    order = {"arrangement": arrangement, "row_latents": 24 if arrangement is Arrangement.PACK else 0}
+    order = {"arrangement": arrangement, "row_latents": 24 if arrangement is Arrangement.JOIN else 0}
     count = 0
     with QueryLoader(config_of(release, **order), TWO) as loader:
         for batch in loader:
@@ -153,12 +153,12 @@ def test_other_queries_are_another_order(driven):
 
 
 @pytest.mark.parametrize("arrangement", list(Arrangement))
-def test_the_ledger_of_queries_is_proven_by_their_plan(driven, tmp_path, arrangement):
+def test_the_ledger_of_queries_is_proven_by_their_order(driven, tmp_path, arrangement):
     release, _ = driven
-    order = {"arrangement": arrangement, "row_latents": 24 if arrangement is Arrangement.PACK else 0}
+    order = {"arrangement": arrangement, "row_latents": 24 if arrangement is Arrangement.JOIN else 0}
     with QueryLoader(config_of(release, ledger=str(tmp_path / "ledger"), **order), TWO) as loader:
         for _ in range(2):
-            assert len(list(loader)) == loader.steps == loader.report.steps
+            assert len(list(loader)) == loader.steps == loader.summary.steps
     timeline = read_timeline(tmp_path / "ledger")
     sources = open_recorded_sources(timeline.identity, [release], [])
     audits = audit_epochs(timeline, sources)

@@ -7,7 +7,7 @@ import numpy as np
 import torch
 
 from wsm_data.loaders.batches.batch import LATENT_TENSORS, NO_SEQUENCE, POSE_SLOTS, BatchLayout, layout_of
-from wsm_data.loaders.order.epoch_plan import EpochPlan
+from wsm_data.loaders.order.epoch_order import EpochOrder
 from wsm_data.loaders.reading.clip_places import ClipPlace
 from wsm_data.loaders.reading.clip_reads import POSE_BYTES
 
@@ -35,29 +35,33 @@ class ArrangedClip:
     latents: int
 
 
-def arrange(rows: Sequence[np.ndarray], places: Sequence[ClipPlace], plan: EpochPlan) -> list[ArrangedClip]:
+def arrange(rows: Sequence[np.ndarray], places: Sequence[ClipPlace], epoch_order: EpochOrder) -> list[ArrangedClip]:
     """Lay the clips of each row one behind the other.
 
     Args:
         rows: refs in each row; int64 [clips of the row].
         places: places of the clips of all rows.
-        plan: says how many latents are taken of each clip.
+        epoch_order: says how many latents are taken of each clip.
     """
     clips: list[ArrangedClip] = []
     for row, refs in enumerate(rows):
         start = 0
-        for latents in plan.sequence_latents[refs].tolist():
+        for latents in epoch_order.sequence_latents[refs].tolist():
             clips.append(ArrangedClip(place=places[len(clips)], row=row, start=start, latents=latents))
             start += latents
     return clips
 
 
 def batch_layout(
-    clips: Sequence[ArrangedClip], rows: int, plan: EpochPlan, latent_shape: tuple[int, int, int], dtype: torch.dtype
+    clips: Sequence[ArrangedClip],
+    rows: int,
+    epoch_order: EpochOrder,
+    latent_shape: tuple[int, int, int],
+    dtype: torch.dtype,
 ) -> BatchLayout:
-    """The sizes of a batch: rows as long as the longest one, or of `row_latents` where they are packed; never empty."""
+    """The sizes of a batch: rows as long as the longest one, or of `row_latents` of joined clips; never empty."""
     longest = max((clip.start + clip.latents for clip in clips), default=1)
-    return layout_of(rows, plan.order.row_latents or longest, len(clips), latent_shape, dtype)
+    return layout_of(rows, epoch_order.config.row_latents or longest, len(clips), latent_shape, dtype)
 
 
 def slots_of(layout: BatchLayout, memory: memoryview, clip: ArrangedClip) -> dict[str, memoryview]:

@@ -178,10 +178,10 @@ def cautions(facts: SourceFacts, order: OrderConfig) -> list[str]:
             f"small shards: the {facts.shards} shards have {mean_bytes / 1e6:.1f} MB on average, and each costs "
             "requests of its own; pack with shards of 256 to 512 MB"
         )
-    if facts.padding_share > HIGH_PADDING_SHARE and order.arrangement is not Arrangement.PACK:
+    if facts.padding_share > HIGH_PADDING_SHARE and order.arrangement is not Arrangement.JOIN:
         bucket = "" if order.arrangement is Arrangement.BUCKET else "order.arrangement=bucket, or "
         found.append(
             f"padding: {facts.padding_share:.0%} of the latents of an epoch are padding; try {bucket}"
-            f"order.arrangement=pack with order.row_latents={facts.longest_latents} or more"
+            f"order.arrangement=join with order.row_latents={facts.longest_latents} or more"
         )
     return found

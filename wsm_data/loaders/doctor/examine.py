@@ -78,8 +78,8 @@ def source_facts(loader: ClipLoader) -> SourceFacts:
     return SourceFacts(
         shards=sum(len(_shards(table)) for table in tables),
         shard_bytes=sum(sum(_shards(table).values()) for table in tables),
-        padding_share=loader.report.padding_share,
-        longest_latents=int(loader.plan.sequence_latents.max()),
+        padding_share=loader.summary.padding_share,
+        longest_latents=int(loader.epoch_order.sequence_latents.max()),
         remote=any(map(_is_remote, tables)),
     )
 

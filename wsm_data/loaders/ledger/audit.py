@@ -1,6 +1,6 @@
-"""The proof that a run saw each clip as often as its plan says, from the ledger its ranks wrote.
+"""The proof that a run saw each clip as often as its order says, from the ledger its ranks wrote.
 
-The plan is computed anew from the releases of the run, and every recorded step is compared with it, rank by rank.
+The order is computed anew from the releases of the run, and every recorded step is compared with it, rank by rank.
 """
 
 from collections.abc import Iterator, Sequence
@@ -10,7 +10,7 @@ import numpy as np
 
 from wsm_data.loaders.ledger.sources import recorded_order
 from wsm_data.loaders.ledger.timeline import EpochRecord, Timeline
-from wsm_data.loaders.order.epoch_plan import EpochPlan, PlanReport
+from wsm_data.loaders.order.epoch_order import EpochOrder, EpochSummary
 from wsm_data.loaders.sources.clips import Sources
 
 _SHOWN = 5
@@ -29,7 +29,7 @@ class EpochAudit:
         seen_once: clips that were seen once.
         seen_more: clips that were seen more often.
         never: clips of the sources that were not seen.
-        plan: what the plan says becomes of the clips.
+        summary: what the order says becomes of the clips.
         misfits: what does not fit, in sentences.
     """
 
@@ -40,7 +40,7 @@ class EpochAudit:
     seen_once: int
     seen_more: int
     never: int
-    plan: PlanReport
+    summary: EpochSummary
     misfits: tuple[str, ...] = field(default=())
 
     @property
@@ -78,7 +78,9 @@ def audit_epochs(timeline: Timeline, sources: Sources) -> tuple[EpochAudit, ...]
         sources: the sources of the run (`open_recorded_sources`).
     """
     order = recorded_order(timeline.identity)
-    return tuple(_audit_epoch(record, sources.plan(order, record.epoch), sources.clips) for record in timeline.epochs)
+    return tuple(
+        _audit_epoch(record, sources.order_epoch(order, record.epoch), sources.clips) for record in timeline.epochs
+    )
 
 
 def sightings(timeline: Timeline, refs: Sequence[int]) -> Iterator[Sighting]:
@@ -104,13 +106,13 @@ def sightings(timeline: Timeline, refs: Sequence[int]) -> Iterator[Sighting]:
                     )
 
 
-def _audit_epoch(record: EpochRecord, plan: EpochPlan, clips: int) -> EpochAudit:
+def _audit_epoch(record: EpochRecord, epoch_order: EpochOrder, clips: int) -> EpochAudit:
     given = [np.concatenate(refs) for _, refs in record.by_step()]
     refs = np.concatenate([np.empty(0, np.int64), *given])
     unknown = (refs < 0) | (refs >= clips)
     times = np.bincount(refs[~unknown], minlength=clips)
     misfits = [f"{int(unknown.sum())} refs are none of the {clips} clips of the sources"] if unknown.any() else []
-    misfits += _against_plan(record, plan)
+    misfits += _against_order(record, epoch_order)
     return EpochAudit(
         epoch=record.epoch,
         steps=record.steps,
@@ -119,23 +121,23 @@ def _audit_epoch(record: EpochRecord, plan: EpochPlan, clips: int) -> EpochAudit
         seen_once=int((times == 1).sum()),
         seen_more=int((times > 1).sum()),
         never=int((times == 0).sum()),
-        plan=plan.report,
+        summary=epoch_order.summary,
         misfits=tuple(f"epoch {record.epoch}: {misfit}" for misfit in misfits),
     )
 
 
-def _against_plan(record: EpochRecord, plan: EpochPlan) -> list[str]:
-    """Every recorded step must have brought what the plan says, rank by rank in this order."""
+def _against_order(record: EpochRecord, epoch_order: EpochOrder) -> list[str]:
+    """Every recorded step must have brought what the order says, rank by rank in this order."""
     misfits = []
-    if plan.steps != record.steps:
-        misfits.append(f"the plan has {plan.steps} steps, but the ledger says {record.steps}")
+    if epoch_order.steps != record.steps:
+        misfits.append(f"the order has {epoch_order.steps} steps, but the ledger says {record.steps}")
     for step, refs in record.by_step():
-        if step < plan.steps:
+        if step < epoch_order.steps:
             for rank, given in enumerate(refs):
-                planned = np.concatenate(plan.rows(step, rank, len(refs)))
-                if not np.array_equal(given, planned):
+                wanted = np.concatenate(epoch_order.rows(step, rank, len(refs)))
+                if not np.array_equal(given, wanted):
                     misfits.append(
-                        f"step {step} must bring rank {rank} of {len(refs)} the refs {planned.tolist()}, "
+                        f"step {step} must bring rank {rank} of {len(refs)} the refs {wanted.tolist()}, "
                         f"found {given.tolist()}"
                     )
     return _first(misfits)
@@ -143,4 +145,4 @@ def _against_plan(record: EpochRecord, plan: EpochPlan) -> list[str]:
 
 def _first(misfits: list[str]) -> list[str]:
     more = len(misfits) - _SHOWN
-    return misfits if more <= 0 else [*misfits[:_SHOWN], f"{more} more steps do not fit the plan"]
+    return misfits if more <= 0 else [*misfits[:_SHOWN], f"{more} more steps do not fit the order"]

@@ -4,7 +4,7 @@ Each rank's files are in order by their number, so no clock is compared. A start
 that was recorded from there on before: those steps were lost with the run that was killed. Rank 0 takes part in every
 session, so its starts are the timeline; the other ranks must have recorded the same stretch, from the same start on.
 Ranks share no name of their session, which would need communication: a rank's latest start of the same world size at
-the same place stands for it, whichever session it is of. Whatever it recorded must still be what the plan says.
+the same place stands for it, whichever session it is of. Whatever it recorded must still be what the order says.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence

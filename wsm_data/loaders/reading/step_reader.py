@@ -19,7 +19,7 @@ from wsm_data.loaders.batches.buffers import BufferPool
 from wsm_data.loaders.batches.filling import ArrangedClip, arrange, batch_layout, describe, slots_of
 from wsm_data.loaders.batches.standardise import convert, standardisations
 from wsm_data.loaders.config import ReadConfig
-from wsm_data.loaders.order.epoch_plan import EpochPlan, chunk_sizes
+from wsm_data.loaders.order.epoch_order import EpochOrder, chunk_sizes
 from wsm_data.loaders.reading.clip_places import clip_places, span_of
 from wsm_data.loaders.reading.clip_reads import read_clip
 from wsm_data.loaders.reading.prefetch import done_alone
@@ -90,37 +90,37 @@ class StepReader:
         """Whether anything is read from behind a URL, so that reading may have to wait for a store."""
         return bool(self._looking_ahead)
 
-    def announce(self, plan: EpochPlan, step: int) -> None:
+    def announce(self, epoch_order: EpochOrder, step: int) -> None:
         """Tell the readers what a step will need, before it is read."""
         for reader in self._looking_ahead:
-            refs = np.concatenate(plan.rows(step, self._rank, self._world_size))
+            refs = np.concatenate(epoch_order.rows(step, self._rank, self._world_size))
             places = clip_places(self._sources, refs)
             reader.expect([span_of(place) for place in places if self._readers[place.source] is reader])
 
-    def read(self, plan: EpochPlan, step: int) -> PackedBatch:
+    def read(self, epoch_order: EpochOrder, step: int) -> PackedBatch:
         """Read what this rank has of a step, in the thread of the caller; errors are those of `StepWork`."""
-        return done_alone(self.begin(plan, step))
+        return done_alone(self.begin(epoch_order, step))
 
-    def begin(self, plan: EpochPlan, step: int) -> "StepWork":
+    def begin(self, epoch_order: EpochOrder, step: int) -> "StepWork":
         """Lay out what this rank has of a step, in memory that is taken for it."""
         watch = Stopwatch()
         with watch.measure(Part.COLLATE):
-            rows = plan.rows(step, self._rank, self._world_size)
+            rows = epoch_order.rows(step, self._rank, self._world_size)
             refs = np.concatenate(rows)
-            clips = arrange(rows, clip_places(self._sources, refs), plan)
-            layout = batch_layout(clips, len(rows), plan, self._latent_shape, self._dtype)
+            clips = arrange(rows, clip_places(self._sources, refs), epoch_order)
+            layout = batch_layout(clips, len(rows), epoch_order, self._latent_shape, self._dtype)
             packed = PackedBatch(
                 block=self._pool.take(layout.size_bytes),
                 layout=layout,
                 keys=tuple(clip.place.key for clip in clips),
-                epoch=plan.epoch,
+                epoch=epoch_order.epoch,
                 step=step,
             )
             work = StepWork(
                 packed=packed,
                 clips=clips,
                 refs=refs,
-                chunk_size=chunk_sizes(refs, plan.order, plan.epoch),
+                chunk_size=chunk_sizes(refs, epoch_order.config, epoch_order.epoch),
                 memory=memoryview(packed.block.numpy()),
                 targets=packed.tensors() if self._converts else {},
                 read_clip=self._read_clip,

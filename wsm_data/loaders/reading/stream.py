@@ -8,7 +8,7 @@ from typing import Generic, TypeVar
 from wsm_data.access.config import RemoteAccess
 from wsm_data.loaders.batches.batch import PackedBatch
 from wsm_data.loaders.config import ReadConfig
-from wsm_data.loaders.order.epoch_plan import EpochPlan
+from wsm_data.loaders.order.epoch_order import EpochOrder
 from wsm_data.loaders.reading.prefetch import Prefetch, Work, done_alone
 from wsm_data.loaders.reading.step_reader import StepReader, StepWork
 from wsm_data.loaders.timing import Part, Stopwatch, Timing
@@ -27,7 +27,7 @@ about the same time, so that many are needed at once: the downloads must begin s
 def open_stream(
     reader: StepReader,
     transfer: Callable[[PackedBatch], Delivered],
-    plan: EpochPlan,
+    epoch_order: EpochOrder,
     steps: Sequence[int],
     read: ReadConfig,
     timing: Timing,
@@ -39,16 +39,16 @@ def open_stream(
     Args:
         reader: reads a step.
         transfer: makes the batch of what was read, or more than that; called in the threads that read.
-        plan: of the epoch.
+        epoch_order: which clips make up the steps.
         steps: what is read, in this order.
         read: threads, workers, and how far to read ahead.
         timing: adds up the time of all parts.
         inline: read in the caller's thread, whatever the settings say.
     """
-    announce = _announcer(reader, plan, steps, read)
+    announce = _announcer(reader, epoch_order, steps, read)
 
     def begin(step: int) -> _BatchWork[Delivered]:
-        return _BatchWork(reader.begin(plan, step), transfer, timing)
+        return _BatchWork(reader.begin(epoch_order, step), transfer, timing)
 
     if read.threads and not inline:
         return Prefetch(iter(steps), begin, announce, threads=read.threads, depth=read.prefetch_batches)
@@ -84,16 +84,18 @@ def _finished(transfer: Callable[[PackedBatch], Delivered], timing: Timing, pack
     return delivered
 
 
-def _announcer(reader: StepReader, plan: EpochPlan, steps: Sequence[int], read: ReadConfig) -> Callable[[int], None]:
+def _announcer(
+    reader: StepReader, epoch_order: EpochOrder, steps: Sequence[int], read: ReadConfig
+) -> Callable[[int], None]:
     """What announces the next steps; it is called once for each step, before that is read."""
     upcoming = iter(steps)
-    ahead = _CLIPS_AHEAD // plan.order.global_batch if read.access is RemoteAccess.SHARDS else 0
+    ahead = _CLIPS_AHEAD // epoch_order.config.global_batch if read.access is RemoteAccess.SHARDS else 0
     counts = chain([1 + ahead], repeat(1))
 
     def announce(step: int) -> None:
         del step
         for later in islice(upcoming, next(counts)):
-            reader.announce(plan, later)
+            reader.announce(epoch_order, later)
 
     return announce
 

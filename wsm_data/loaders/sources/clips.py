@@ -16,7 +16,7 @@ from wsm_data.access.release import Release, open_release
 from wsm_data.errors import ConfigError
 from wsm_data.files.digest import sha256_bytes
 from wsm_data.loaders.config import OrderConfig, SourceConfig
-from wsm_data.loaders.order.epoch_plan import EpochPlan, plan_epoch
+from wsm_data.loaders.order.epoch_order import EpochOrder, order_epoch
 from wsm_data.loaders.order.pass_order import SourceLayout
 from wsm_data.loaders.order.stable_hash import Int64Array
 from wsm_data.shards.index_row import IndexRow
@@ -129,13 +129,13 @@ class Sources:
         """What the order depends on."""
         return tuple(table.layout for table in self.tables)
 
-    def plan(self, order: OrderConfig, epoch: int) -> EpochPlan:
-        """Plan an epoch.
+    def order_epoch(self, order: OrderConfig, epoch: int) -> EpochOrder:
+        """Order an epoch.
 
         Raises:
-            ConfigError: a clip does not fit into a packed row, or the epoch has no step.
+            ConfigError: a clip does not fit into a row, or the epoch has no step.
         """
-        return plan_epoch(self.layouts, order, epoch)
+        return order_epoch(self.layouts, order, epoch)
 
     def locate(self, ref: int) -> tuple[SourceTable, int]:
         """The source of a clip, and the number of the clip in the source's table.

@@ -2,7 +2,7 @@
 
 A query is a clip and a replan latent r: the model sees the latents 0 to r and dreams the next ones, which are compared
 with the real future. A clip has as many queries in every epoch, at latents drawn anew for each, so queries are numbered
-once and for all: they are a table of sources like clips, dealt by the same plan, with the same state.
+once and for all: they are a table of sources like clips, in an order of the same kind, with the same state.
 """
 
 import logging
@@ -14,7 +14,7 @@ import numpy as np
 
 from wsm_data.errors import ConfigError
 from wsm_data.loaders.config import MAX_CHUNK_LATENTS, OrderConfig, SourceConfig
-from wsm_data.loaders.order.epoch_plan import EpochPlan, plan_epoch
+from wsm_data.loaders.order.epoch_order import EpochOrder, order_epoch
 from wsm_data.loaders.order.pass_order import Int32Array
 from wsm_data.loaders.order.stable_hash import Draw, Int64Array, mix64
 from wsm_data.loaders.sources.clips import Sources, SourceTable, open_sources
@@ -68,8 +68,8 @@ class QuerySources(Sources):
         ]
         return np.concatenate(drawn).astype(np.int32)
 
-    def plan(self, order: OrderConfig, epoch: int) -> EpochPlan:
-        """Plan an epoch; a sequence is what comes up to the replan latent and with it.
+    def order_epoch(self, order: OrderConfig, epoch: int) -> EpochOrder:
+        """Order an epoch; a sequence is what comes up to the replan latent and with it.
 
         Raises:
             ConfigError: the settings of the order do not go with queries, or the epoch has no step.
@@ -82,7 +82,7 @@ class QuerySources(Sources):
         lengths = self.replan_latents(order, epoch) + 1
         parts = np.split(lengths, [table.base for table in self.tables[1:]])
         layouts = [replace(layout, latents=part) for layout, part in zip(self.layouts, parts, strict=True)]
-        return plan_epoch(layouts, order, epoch)
+        return order_epoch(layouts, order, epoch)
 
     def identity(self) -> list[dict[str, Any]]:
         """What the order is drawn over, as JSON; the settings of the queries are part of it."""

@@ -12,30 +12,30 @@ LATENT_SHAPE = (48, 6, 10)
 
 
 @pytest.fixture
-def plan_of(released):
+def order_of(released):
     sources = open_sources([SourceConfig(release=str(released.folder))])
 
-    def plan(**settings):
-        return sources, sources.plan(OrderConfig(**({"global_batch": 4} | settings)), 0)
+    def make(**settings):
+        return sources, sources.order_epoch(OrderConfig(**({"global_batch": 4} | settings)), 0)
 
-    return plan
+    return make
 
 
-def _arranged(sources, plan, step=0):
-    rows = plan.rows(step, 0, 1)
-    clips = arrange(rows, clip_places(sources, np.concatenate(rows)), plan)
-    return rows, clips, batch_layout(clips, len(rows), plan, LATENT_SHAPE, torch.float16)
+def _arranged(sources, epoch_order, step=0):
+    rows = epoch_order.rows(step, 0, 1)
+    clips = arrange(rows, clip_places(sources, np.concatenate(rows)), epoch_order)
+    return rows, clips, batch_layout(clips, len(rows), epoch_order, LATENT_SHAPE, torch.float16)
 
 
 @pytest.mark.parametrize(
     "settings",
-    [{}, {"max_latents": 2}, {"arrangement": Arrangement.PACK, "row_latents": 8, "global_batch": 2}],
+    [{}, {"max_latents": 2}, {"arrangement": Arrangement.JOIN, "row_latents": 8, "global_batch": 2}],
     ids=str,
 )
-def test_the_clips_of_a_row_lie_one_behind_the_other(plan_of, settings):
-    sources, plan = plan_of(**settings)
-    for step in range(plan.steps):
-        rows, clips, layout = _arranged(sources, plan, step)
+def test_the_clips_of_a_row_lie_one_behind_the_other(order_of, settings):
+    sources, epoch_order = order_of(**settings)
+    for step in range(epoch_order.steps):
+        rows, clips, layout = _arranged(sources, epoch_order, step)
         assert [clip.place.key for clip in clips] == sources.keys(np.concatenate(rows))
         ends = dict.fromkeys(range(len(rows)), 0)
         for clip in clips:
@@ -46,10 +46,10 @@ def test_the_clips_of_a_row_lie_one_behind_the_other(plan_of, settings):
         assert (layout.rows, layout.sequences) == (len(rows), len(clips))
 
 
-def test_slots_of_different_clips_and_tensors_lie_apart(plan_of):
+def test_slots_of_different_clips_and_tensors_lie_apart(order_of):
     """What is written through the slots of one clip arrives in its latents of each tensor, and nowhere else."""
-    sources, plan = plan_of(arrangement=Arrangement.PACK, row_latents=8, global_batch=2)
-    _, clips, layout = _arranged(sources, plan)
+    sources, epoch_order = order_of(arrangement=Arrangement.JOIN, row_latents=8, global_batch=2)
+    _, clips, layout = _arranged(sources, epoch_order)
     assert len(clips) > 2
     packed = PackedBatch(
         block=torch.zeros(layout.size_bytes, dtype=torch.uint8), layout=layout, keys=(), epoch=0, step=0
@@ -68,11 +68,11 @@ def test_slots_of_different_clips_and_tensors_lie_apart(plan_of):
             slot[:] = bytes(slot.nbytes)
 
 
-def test_describing_says_all_that_is_not_read_whatever_the_memory_held_before(plan_of, expected_batch, released):
-    sources, plan = plan_of(arrangement=Arrangement.PACK, row_latents=7, global_batch=2)
+def test_describing_says_all_that_is_not_read_whatever_the_memory_held_before(order_of, expected_batch, released):
+    sources, epoch_order = order_of(arrangement=Arrangement.JOIN, row_latents=7, global_batch=2)
     padded = 0
-    for step in range(plan.steps):
-        rows, clips, layout = _arranged(sources, plan, step)
+    for step in range(epoch_order.steps):
+        rows, clips, layout = _arranged(sources, epoch_order, step)
         block = torch.full((layout.size_bytes,), 255, dtype=torch.uint8)
         keys = tuple(clip.place.key for clip in clips)
         refs, drawn = np.concatenate(rows), np.arange(len(clips))

@@ -163,6 +163,6 @@ def test_few_small_shards_of_a_local_release_are_no_cause_for_alarm():
     assert cautions(facts(shards=3, shard_bytes=3_000_000), OrderConfig(global_batch=64)) == []
 
 
-def test_rows_that_are_packed_already_are_not_told_to_be_packed():
-    order = OrderConfig(arrangement=Arrangement.PACK, row_latents=64)
+def test_clips_that_are_joined_already_are_not_told_to_be_joined():
+    order = OrderConfig(arrangement=Arrangement.JOIN, row_latents=64)
     assert cautions(facts(padding_share=0.41), order) == []

@@ -29,7 +29,7 @@ def look(folder, *, batches=3, seconds=30.0, **settings):
 def test_clips_and_bytes_are_those_behind_the_first_batch(released, make_loader, settings):
     run, _ = look(released.folder, **settings)
     loader = make_loader(global_batch=BATCH, shuffle=False)
-    refs = np.concatenate([np.concatenate(loader.plan.rows(step, 0, 1)) for step in (1, 2, 3)])
+    refs = np.concatenate([np.concatenate(loader.epoch_order.rows(step, 0, 1)) for step in (1, 2, 3)])
     places = clip_places(loader.sources, refs)
     # a clip of F latents has 1 + 4 (F - 1) poses; the slots of a batch have 4 F, three more of 28 bytes
     assert run.clips == 3 * BATCH
@@ -89,12 +89,12 @@ def test_its_diagnosis_is_a_sentence_about_the_run(released):
     assert all("few" not in caution for caution in cautions(facts, settings.order))  # shards of 0.3 MB
 
 
-def test_shards_and_padding_are_counted_from_release_and_plan(released, make_loader):
+def test_shards_and_padding_are_counted_from_release_and_order(released, make_loader):
     loader = make_loader(global_batch=BATCH, remainder=Remainder.PAD)
     facts = source_facts(loader)
     train = [shard for shard in released.release.manifest.shards if shard.split == "train"]
     assert (facts.shards, facts.shard_bytes) == (len(train), sum(shard.bytes for shard in train))
-    assert facts.padding_share == loader.report.padding_share > 0
+    assert facts.padding_share == loader.summary.padding_share > 0
     assert facts.longest_latents == max(len(clip.rgb_latent) for clip in released.clips.values())
     assert not facts.remote
 

@@ -12,7 +12,7 @@ from wsm_data.loaders.config import Arrangement, OrderConfig, Remainder
 from wsm_data.loaders.ledger.audit import audit_epochs, sightings
 from wsm_data.loaders.ledger.timeline import read_timeline
 from wsm_data.loaders.ledger.writer import LedgerWriter
-from wsm_data.loaders.order.epoch_plan import plan_epoch
+from wsm_data.loaders.order.epoch_order import order_epoch
 from wsm_data.loaders.order.pass_order import SourceLayout
 
 
@@ -29,17 +29,17 @@ def record(folder, layouts, order, *, world_size=2, epochs=1, last_step=None, ch
     for rank in range(world_size):
         with LedgerWriter(folder, identity, rank, world_size) as writer:
             for epoch in range(epochs):
-                plan = plan_epoch(layouts, order, epoch)
-                writer.begin(epoch, 0, plan.steps)
-                for step in range(plan.steps if last_step is None or epoch < epochs - 1 else last_step):
-                    refs = np.concatenate(plan.rows(step, rank, world_size))
+                epoch_order = order_epoch(layouts, order, epoch)
+                writer.begin(epoch, 0, epoch_order.steps)
+                for step in range(epoch_order.steps if last_step is None or epoch < epochs - 1 else last_step):
+                    refs = np.concatenate(epoch_order.rows(step, rank, world_size))
                     writer.record(epoch, step, change(step, rank, refs))
     return read_timeline(folder)
 
 
 def sources_of(layouts):
-    """What the audit asks of sources: their plans, and how many clips they have."""
-    return SimpleNamespace(plan=partial(plan_epoch, layouts), clips=sum(map(len, layouts)))
+    """What the audit asks of sources: their orders, and how many clips they have."""
+    return SimpleNamespace(order_epoch=partial(order_epoch, layouts), clips=sum(map(len, layouts)))
 
 
 def misfits(audits):
@@ -58,17 +58,17 @@ REMAINDERS = list(Remainder)
     arrangement=st.sampled_from(list(Arrangement)),
     seed=st.integers(0, 5),
 )
-def test_a_run_that_followed_its_plan_fits(tmp_path_factory, clips, weights, batch, remainder, arrangement, seed):
+def test_a_run_that_followed_its_order_fits(tmp_path_factory, clips, weights, batch, remainder, arrangement, seed):
     order = OrderConfig(
         seed=seed,
         global_batch=batch,
         remainder=remainder,
         arrangement=arrangement,
-        row_latents=12 if arrangement is Arrangement.PACK else 0,
+        row_latents=12 if arrangement is Arrangement.JOIN else 0,
     )
     layouts = [layout_of(*pair) for pair in zip(clips, weights, strict=False)]
     if (
-        arrangement is Arrangement.PACK
+        arrangement is Arrangement.JOIN
         or sum(weight * count for count, weight in zip(clips, weights, strict=False)) < 12
     ):
         layouts.append(layout_of(60))
@@ -76,15 +76,17 @@ def test_a_run_that_followed_its_plan_fits(tmp_path_factory, clips, weights, bat
     audits = audit_epochs(timeline, sources_of(layouts))
     assert misfits(audits) == []
     for audit in audits:
-        plan = plan_epoch(layouts, order, audit.epoch)
-        refs = [ref for step in range(plan.steps) for row in plan.rows(step, 0, 1) for ref in row.tolist()]
+        epoch_order = order_epoch(layouts, order, audit.epoch)
+        refs = [
+            ref for step in range(epoch_order.steps) for row in epoch_order.rows(step, 0, 1) for ref in row.tolist()
+        ]
         times = Counter(refs)
         assert audit.complete
         assert audit.delivered == len(refs)
         assert audit.seen_once == sum(count == 1 for count in times.values())
         assert audit.seen_more == sum(count > 1 for count in times.values())
         assert audit.seen_once + audit.seen_more + audit.never == sum(len(layout) for layout in layouts)
-        assert audit.plan == plan.report
+        assert audit.summary == epoch_order.summary
 
 
 def test_an_epoch_that_was_stopped_is_not_complete_and_fits_as_far_as_it_went(tmp_path):
@@ -126,10 +128,10 @@ def test_what_does_not_fit_is_said(tmp_path, change, message):
     assert any(message in misfit for misfit in misfits(audit_epochs(timeline, sources_of(layouts))))
 
 
-def test_a_plan_of_another_length_does_not_fit(tmp_path):
+def test_an_order_of_another_length_does_not_fit(tmp_path):
     timeline = record(tmp_path, [layout_of(20)], OrderConfig(global_batch=4))
     [audit] = audit_epochs(timeline, sources_of([layout_of(12)]))
-    assert "epoch 0: the plan has 3 steps, but the ledger says 5" in audit.misfits
+    assert "epoch 0: the order has 3 steps, but the ledger says 5" in audit.misfits
 
 
 def test_many_misfits_are_counted(tmp_path):
@@ -137,20 +139,20 @@ def test_many_misfits_are_counted(tmp_path):
     timeline = record(tmp_path, layouts, OrderConfig(global_batch=4), change=lambda step, rank, refs: refs[::-1])
     [audit] = audit_epochs(timeline, sources_of(layouts))
     assert len(audit.misfits) == 6
-    assert audit.misfits[-1] == "epoch 0: 25 more steps do not fit the plan"
+    assert audit.misfits[-1] == "epoch 0: 25 more steps do not fit the order"
 
 
 def test_every_delivery_of_a_clip_is_found_and_those_that_were_lost_are_marked(tmp_path):
     layouts, order = [layout_of(20)], OrderConfig(global_batch=4)
     record(tmp_path, layouts, order, epochs=1, last_step=4)
     timeline = record(tmp_path, layouts, order, epochs=2, world_size=1)
-    plans = [plan_epoch(layouts, order, epoch) for epoch in range(2)]
+    orders = [order_epoch(layouts, order, epoch) for epoch in range(2)]
     for ref in range(20):
         expected = []
         for epoch, steps, world_size, counts in [(0, 4, 2, False), (0, 5, 1, True), (1, 5, 1, True)]:
             for step in range(steps):
                 for rank in range(world_size):
-                    if ref in np.concatenate(plans[epoch].rows(step, rank, world_size)):
+                    if ref in np.concatenate(orders[epoch].rows(step, rank, world_size)):
                         expected.append((epoch, step, rank, world_size, counts))
         found = [
             (seen.epoch, seen.step, seen.rank, seen.world_size, seen.counts) for seen in sightings(timeline, [ref])

@@ -43,7 +43,7 @@ def write_hard(path, tiny, keys):
     [
         OrderConfig(),
         OrderConfig(seed=3, remainder=Remainder.REPEAT, arrangement=Arrangement.BUCKET, chunk_sizes=(4,)),
-        OrderConfig(shuffle=False, arrangement=Arrangement.PACK, row_latents=9, max_latents=7),
+        OrderConfig(shuffle=False, arrangement=Arrangement.JOIN, row_latents=9, max_latents=7),
     ],
 )
 def test_the_order_comes_back_as_it_was(tiny, order):

@@ -5,7 +5,7 @@ import torch
 from wsm_data.errors import ConfigError
 from wsm_data.loaders.batches.batch import Batch
 from wsm_data.loaders.config import Arrangement, ReadConfig, Remainder, SourceConfig
-from wsm_data.loaders.order.epoch_plan import chunk_sizes
+from wsm_data.loaders.order.epoch_order import chunk_sizes
 from wsm_data.loaders.reading.step_reader import StepReader
 from wsm_data.loaders.sources.clips import open_sources
 
@@ -28,8 +28,8 @@ def _require_equal(batch: Batch, expected: dict[str, np.ndarray]) -> None:
         {"verify": "never", "max_latents": 2},
         {"verify": "always"},
         {"arrangement": Arrangement.BUCKET, "pool": 3},
-        {"arrangement": Arrangement.PACK, "row_latents": 9, "global_batch": 2},
-        {"arrangement": Arrangement.PACK, "row_latents": 9, "global_batch": 2, "max_latents": 4, "verify": "never"},
+        {"arrangement": Arrangement.JOIN, "row_latents": 9, "global_batch": 2},
+        {"arrangement": Arrangement.JOIN, "row_latents": 9, "global_batch": 2, "max_latents": 4, "verify": "never"},
         {"remainder": Remainder.PAD},
     ],
     ids=str,
@@ -45,16 +45,18 @@ def test_batches_hold_what_the_clips_hold(released, make_loader, expected_batch,
     assert count > released.release.manifest.clips
 
 
-def test_rows_are_those_of_the_plan(released, make_loader):
-    loader = make_loader(**STORED, arrangement=Arrangement.PACK, row_latents=9, global_batch=2)
-    plan = loader.plan
+def test_rows_are_those_of_the_order(released, make_loader):
+    loader = make_loader(**STORED, arrangement=Arrangement.JOIN, row_latents=9, global_batch=2)
+    epoch_order = loader.epoch_order
     for batch in loader:
-        rows = plan.rows(batch.step, 0, 1)
+        rows = epoch_order.rows(batch.step, 0, 1)
         assert batch.refs.tolist() == np.concatenate(rows).tolist()
         assert batch.row.tolist() == [row for row, refs in enumerate(rows) for _ in refs]
         assert batch.keys == tuple(loader.sources.keys(batch.refs.numpy()))
-        assert batch.chunk_size.tolist() == chunk_sizes(batch.refs.numpy(), plan.order, plan.epoch).tolist()
-        assert batch.epoch == plan.epoch == 0
+        assert (
+            batch.chunk_size.tolist() == chunk_sizes(batch.refs.numpy(), epoch_order.config, epoch_order.epoch).tolist()
+        )
+        assert batch.epoch == epoch_order.epoch == 0
 
 
 def test_a_batch_of_padding_alone_has_one_latent_and_no_sequence(make_loader):

@@ -15,7 +15,7 @@ from wsm_data.access.release import open_release
 from wsm_data.errors import IntegrityError
 from wsm_data.files.digest import sha256_file
 from wsm_data.loaders.config import OrderConfig, ReadConfig, SourceConfig
-from wsm_data.loaders.order.epoch_plan import EpochPlan
+from wsm_data.loaders.order.epoch_order import EpochOrder
 from wsm_data.loaders.reading.clip_places import READ_MEMBERS
 from wsm_data.loaders.reading.step_reader import StepReader
 from wsm_data.loaders.sources.clips import open_sources
@@ -41,14 +41,14 @@ def victim(released) -> IndexRow:
 def _read_all(folder: Path, **settings: object) -> dict[str, str]:
     """Reads every clip in a step of its own; returns the messages of those that were refused, by key."""
     sources = open_sources([SourceConfig(release=str(folder))])
-    plan: EpochPlan = sources.plan(OrderConfig(global_batch=1, shuffle=False), 0)
+    epoch_order: EpochOrder = sources.order_epoch(OrderConfig(global_batch=1, shuffle=False), 0)
     reader = StepReader(sources, ReadConfig(**settings), rank=0, world_size=1)
     refused: dict[str, str] = {}
-    for step in range(plan.steps):
+    for step in range(epoch_order.steps):
         try:
-            reader.read(plan, step)
+            reader.read(epoch_order, step)
         except IntegrityError as error:
-            refused[sources.keys(plan.rows(step, 0, 1)[0])[0]] = str(error)
+            refused[sources.keys(epoch_order.rows(step, 0, 1)[0])[0]] = str(error)
     reader.close()
     return refused
 
@@ -123,23 +123,23 @@ def test_a_changed_byte_is_named_with_shard_clip_and_member(folder, victim, dama
 def test_a_prefix_vouches_for_the_whole_member_the_first_time(folder, victim, damage, max_latents):
     damage(folder, victim)
     sources = open_sources([SourceConfig(release=str(folder))])
-    plan = sources.plan(OrderConfig(global_batch=1, shuffle=False, max_latents=max_latents), 0)
+    epoch_order = sources.order_epoch(OrderConfig(global_batch=1, shuffle=False, max_latents=max_latents), 0)
     reader = StepReader(sources, ReadConfig(verify="first"), rank=0, world_size=1)
     step = sources.keys(range(sources.clips)).index(victim.key)
     with pytest.raises(IntegrityError, match=f"clip {victim.key}: the checksum"):
-        reader.read(plan, step)
+        reader.read(epoch_order, step)
 
 
 def test_damage_that_is_read_again_is_refused_again(folder, victim):
     """A clip counts as checked only when it was found whole."""
     _flip(0, "first byte")(folder, victim)
     sources = open_sources([SourceConfig(release=str(folder))])
-    plan = sources.plan(OrderConfig(global_batch=1, shuffle=False), 0)
+    epoch_order = sources.order_epoch(OrderConfig(global_batch=1, shuffle=False), 0)
     reader = StepReader(sources, ReadConfig(verify="first"), rank=0, world_size=1)
     step = sources.keys(range(sources.clips)).index(victim.key)
     for _ in range(2):
         with pytest.raises(IntegrityError, match="checksum"):
-            reader.read(plan, step)
+            reader.read(epoch_order, step)
 
 
 def test_a_missing_shard_is_named_with_each_of_its_clips(folder, victim, released):

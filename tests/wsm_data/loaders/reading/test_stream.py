@@ -14,13 +14,13 @@ from wsm_data.loaders.timing import Part, Timing
 @pytest.fixture
 def stream_of(released):
     sources = open_sources([SourceConfig(release=str(released.folder))])
-    plan = sources.plan(OrderConfig(global_batch=4), 0)
+    epoch_order = sources.order_epoch(OrderConfig(global_batch=4), 0)
 
     def make(steps, *, inline=False, timing=None, **reading):
         read = ReadConfig(**reading)
         reader = StepReader(sources, read, rank=0, world_size=1)
         transfer = open_transfer(read, released.release.manifest)
-        return open_stream(reader, transfer, plan, steps, read, timing or Timing(), inline=inline)
+        return open_stream(reader, transfer, epoch_order, steps, read, timing or Timing(), inline=inline)
 
     return make
 

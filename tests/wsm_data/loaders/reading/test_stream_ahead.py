@@ -16,19 +16,19 @@ class Recorder:
     def __init__(self):
         self.told = []
 
-    def announce(self, plan, step):
+    def announce(self, epoch_order, step):
         self.told.append(("announced", step))
 
-    def begin(self, plan, step):
+    def begin(self, epoch_order, step):
         self.told.append(("read", step))
         return SimpleNamespace(parts=0, complete=lambda: SimpleNamespace(seconds={}))
 
 
 def run(steps, **settings):
     recorder = Recorder()
-    plan = SimpleNamespace(order=SimpleNamespace(global_batch=4096))
+    epoch_order = SimpleNamespace(config=SimpleNamespace(global_batch=4096))
     read = ReadConfig(threads=0, **settings)
-    list(open_stream(recorder, lambda packed: packed, plan, steps, read, Timing(), inline=False))
+    list(open_stream(recorder, lambda packed: packed, epoch_order, steps, read, Timing(), inline=False))
     return recorder.told
 
 

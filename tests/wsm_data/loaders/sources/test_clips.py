@@ -140,4 +140,4 @@ def test_sources_cross_to_another_process_as_settings(config: SourceConfig) -> N
     copy = pickle.loads(pickle.dumps(sources))  # noqa: S301 - what DataLoader does with a worker's arguments
     assert copy.identity() == sources.identity()
     order = OrderConfig(global_batch=2)
-    np.testing.assert_array_equal(copy.plan(order, 1).slots, sources.plan(order, 1).slots)
+    np.testing.assert_array_equal(copy.order_epoch(order, 1).slots, sources.order_epoch(order, 1).slots)

@@ -81,9 +81,11 @@ def test_sequences_of_the_plan_end_with_the_replan_latent(long_release):
     sources = open_queries([SourceConfig(release=long_release)], QueryConfig(queries_per_clip=2, future_latents=1))
     order = OrderConfig(global_batch=3)
     for epoch in range(3):
-        plan = sources.plan(order, epoch)
-        assert plan.sequence_latents.tolist() == (sources.replan_latents(order, epoch) + 1).tolist()
-        refs = [ref for step in range(plan.steps) for row in plan.rows(step, 0, 1) for ref in row.tolist()]
+        epoch_order = sources.order_epoch(order, epoch)
+        assert epoch_order.sequence_latents.tolist() == (sources.replan_latents(order, epoch) + 1).tolist()
+        refs = [
+            ref for step in range(epoch_order.steps) for row in epoch_order.rows(step, 0, 1) for ref in row.tolist()
+        ]
         assert len(set(refs)) == len(refs) == 3 * (sources.clips // 3)
 
 
@@ -96,7 +98,7 @@ def test_two_sources_of_queries_are_numbered_one_after_the_other(long_release):
     replan = sources.replan_latents(order, 0)
     assert len(replan) == sources.clips == 2 * len(one)
     assert replan[: len(one)].tolist() != replan[len(one) :].tolist()
-    assert sources.plan(order, 0).steps == 3 * len(one)
+    assert sources.order_epoch(order, 0).steps == 3 * len(one)
 
 
 def test_a_table_of_queries_as_long_as_the_index_reads_its_own_rows(long_release):
@@ -110,7 +112,7 @@ def test_a_table_of_queries_as_long_as_the_index_reads_its_own_rows(long_release
 def test_a_cut_of_sequences_is_refused(long_release):
     sources = open_queries([SourceConfig(release=long_release)], QueryConfig())
     with pytest.raises(ConfigError, match="max_latents must be 0, found 3; set max_history_latents"):
-        sources.plan(OrderConfig(max_latents=3), 0)
+        sources.order_epoch(OrderConfig(max_latents=3), 0)
 
 
 def test_the_settings_of_queries_are_part_of_what_the_order_is_drawn_over(long_release):

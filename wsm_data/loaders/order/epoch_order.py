@@ -1,4 +1,4 @@
-"""The plan of an epoch, a pure function of sources and settings: which clips stand in which row of which step."""
+"""The order of an epoch, a pure function of sources and settings: which clips stand in which row of which step."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from wsm_data.loaders.order.stable_hash import Draw, Int64Array, mix64
 
 
 @dataclass(frozen=True, kw_only=True)
-class PlanReport:
+class EpochSummary:
     """What becomes of the clips of an epoch.
 
     Attributes:
@@ -26,7 +26,7 @@ class PlanReport:
         repeated_rows: rows that stand in a second step.
         padded_rows: slots without a row.
         padding_share: latents of all steps that are padding, where every row is as long as the longest of its step over
-            all ranks, or `row_latents` where rows are packed; 0 to 1. Batches of a rank are padded to their own longest
+            all ranks, or `row_latents` of joined clips; 0 to 1. Batches of a rank are padded to their own longest
             row and have no more than that.
     """
 
@@ -40,12 +40,12 @@ class PlanReport:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class EpochPlan:
+class EpochOrder:
     """All global steps of an epoch.
 
     Attributes:
         epoch: number of the epoch.
-        order: settings of the order.
+        config: settings of the order.
         refs: clips of the epoch, row after row; int64 [clips].
         row_starts: first clip of each row in `refs`, and the end; int64 [rows + 1]. None where each row is one clip.
         slots: row in each slot of each step, `EMPTY_ROW` where there is none; int64 [global_batch, steps].
@@ -53,7 +53,7 @@ class EpochPlan:
     """
 
     epoch: int
-    order: OrderConfig
+    config: OrderConfig
     refs: Int64Array
     row_starts: Int64Array | None
     slots: Int64Array
@@ -74,18 +74,18 @@ class EpochPlan:
             ConfigError: the world size does not divide the global batch.
             ValueError: there is no such step or rank.
         """
-        share = rows_per_rank(self.order, world_size)
+        share = rows_per_rank(self.config, world_size)
         if not (0 <= step < self.steps and 0 <= rank < world_size):
             raise ValueError(f"step {step} of {self.steps} and rank {rank} of {world_size} must exist")
         numbers = self.slots[rank * share : (rank + 1) * share, step]
         return [self._row(int(number)) for number in numbers]
 
     @cached_property
-    def report(self) -> PlanReport:
+    def summary(self) -> EpochSummary:
         """What becomes of the clips; counted when it is first asked for."""
         clips_per_row = np.ones(len(self.refs), np.int64) if self.row_starts is None else np.diff(self.row_starts)
         times = np.bincount(self.slots[self.slots != EMPTY_ROW], minlength=len(clips_per_row))
-        return PlanReport(
+        return EpochSummary(
             clips=len(self.refs),
             rows=len(clips_per_row),
             steps=self.steps,
@@ -104,13 +104,13 @@ class EpochPlan:
     def _padding_share(self) -> float:
         lengths = np.append(_row_lengths(self.refs, self.row_starts, self.sequence_latents), 0)  # of EMPTY_ROW, last
         in_slots = lengths[self.slots]
-        longest = self.order.row_latents or in_slots.max(axis=0, initial=0)
-        space = int(np.sum(longest * np.ones(self.steps, np.int64))) * self.order.global_batch
+        longest = self.config.row_latents or in_slots.max(axis=0, initial=0)
+        space = int(np.sum(longest * np.ones(self.steps, np.int64))) * self.config.global_batch
         return 1 - int(in_slots.sum()) / space if space else 0.0
 
 
-def plan_epoch(layouts: Sequence[SourceLayout], order: OrderConfig, epoch: int) -> EpochPlan:
-    """Plan an epoch.
+def order_epoch(layouts: Sequence[SourceLayout], order: OrderConfig, epoch: int) -> EpochOrder:
+    """Order an epoch.
 
     Args:
         layouts: the sources.
@@ -118,7 +118,7 @@ def plan_epoch(layouts: Sequence[SourceLayout], order: OrderConfig, epoch: int) 
         epoch: number of the epoch, from 0.
 
     Raises:
-        ConfigError: a clip does not fit into a packed row, or the epoch has no step.
+        ConfigError: a clip does not fit into a row, or the epoch has no step.
     """
     sequence_latents = _sequence_latents(layouts, order)
     refs, row_starts = _rows(mixed_refs(layouts, order, epoch), sequence_latents, order)
@@ -133,9 +133,9 @@ def plan_epoch(layouts: Sequence[SourceLayout], order: OrderConfig, epoch: int) 
         full = rows // order.global_batch
         lengths = sequence_latents[refs]
         slots[:, :full] = bucket_lanes(slots[:, :full], lengths, order, epoch)
-    return EpochPlan(
+    return EpochOrder(
         epoch=epoch,
-        order=order,
+        config=order,
         refs=refs,
         row_starts=row_starts,
         slots=slots,
@@ -180,12 +180,12 @@ def _sequence_latents(layouts: Sequence[SourceLayout], order: OrderConfig) -> In
 
 def _rows(refs: Int64Array, sequence_latents: Int32Array, order: OrderConfig) -> tuple[Int64Array, Int64Array | None]:
     """Refs row after row, and where each row starts; None where each is one clip."""
-    if order.arrangement is not Arrangement.PACK:
+    if order.arrangement is not Arrangement.JOIN:
         return refs, None
-    from wsm_data.loaders.order.packing import pack_rows  # numba, for those who pack
+    from wsm_data.loaders.order.joining import join_rows  # numba, for those who join clips
 
     _require_fitting(sequence_latents, order)
-    taken, starts = pack_rows(sequence_latents[refs], row_latents=order.row_latents, pool=order.pool)
+    taken, starts = join_rows(sequence_latents[refs], row_latents=order.row_latents, pool=order.pool)
     return refs[taken], starts
 
 

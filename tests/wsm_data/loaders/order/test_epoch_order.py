@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from wsm_data.errors import ConfigError
 from wsm_data.loaders.config import Arrangement, OrderConfig, Remainder
-from wsm_data.loaders.order.epoch_plan import EpochPlan, chunk_sizes, plan_epoch, rows_per_rank
+from wsm_data.loaders.order.epoch_order import EpochOrder, chunk_sizes, order_epoch, rows_per_rank
 from wsm_data.loaders.order.mixing import mixed_refs
 from wsm_data.loaders.order.pass_order import SourceLayout
 
@@ -43,7 +43,7 @@ def orders(draw: st.DrawFn, remainder: Sequence[Remainder] = tuple(Remainder)) -
         max_latents=draw(st.sampled_from([0, 5])),
         arrangement=arrangement,
         pool=draw(st.integers(1, 5)),
-        row_latents=LONGEST if arrangement is Arrangement.PACK else 0,
+        row_latents=LONGEST if arrangement is Arrangement.JOIN else 0,
     )
 
 
@@ -54,11 +54,11 @@ def one_source(clips: int = 50, latents: int = 4, weight: float = 1.0) -> list[S
     return [SourceLayout(shard_clips=np.array([clips]), latents=np.full(clips, latents, np.int32), weight=weight)]
 
 
-def rows_of(plan: EpochPlan, world_size: int = 1) -> list[list[list[list[int]]]]:
+def rows_of(epoch_order: EpochOrder, world_size: int = 1) -> list[list[list[list[int]]]]:
     """Refs by step, rank and row."""
     return [
-        [[row.tolist() for row in plan.rows(step, rank, world_size)] for rank in range(world_size)]
-        for step in range(plan.steps)
+        [[row.tolist() for row in epoch_order.rows(step, rank, world_size)] for rank in range(world_size)]
+        for step in range(epoch_order.steps)
     ]
 
 
@@ -66,10 +66,10 @@ def rows_of(plan: EpochPlan, world_size: int = 1) -> list[list[list[list[int]]]]
 def test_ranks_together_have_the_same_rows_in_the_same_order(
     sources: list[SourceLayout], order: OrderConfig, epoch: int
 ) -> None:
-    plan = plan_epoch(sources, replace(order, global_batch=12), epoch)
-    wanted = [ranks[0] for ranks in rows_of(plan)]
+    epoch_order = order_epoch(sources, replace(order, global_batch=12), epoch)
+    wanted = [ranks[0] for ranks in rows_of(epoch_order)]
     for world_size in WORLD_SIZES:
-        steps = rows_of(plan, world_size)
+        steps = rows_of(epoch_order, world_size)
         assert [[row for rank in ranks for row in rank] for ranks in steps] == wanted
         assert {len(rank) for ranks in steps for rank in ranks} == {12 // world_size}
 
@@ -78,13 +78,13 @@ def test_ranks_together_have_the_same_rows_in_the_same_order(
 def test_an_epoch_brings_what_the_sources_give_to_it(
     sources: list[SourceLayout], order: OrderConfig, epoch: int
 ) -> None:
-    plan = plan_epoch(sources, order, epoch)
+    epoch_order = order_epoch(sources, order, epoch)
     wanted = Counter(mixed_refs(sources, order, epoch).tolist())
-    found = Counter(ref for ranks in rows_of(plan) for row in ranks[0] for ref in row)
+    found = Counter(ref for ranks in rows_of(epoch_order) for row in ranks[0] for ref in row)
     if order.remainder is Remainder.PAD:
         assert found == wanted
     assert found.keys() == wanted.keys()
-    assert sum((found - wanted).values()) >= plan.report.repeated_rows  # a repeated row has at least one clip
+    assert sum((found - wanted).values()) >= epoch_order.summary.repeated_rows  # a repeated row has at least one clip
     assert not wanted - found
 
 
@@ -94,56 +94,56 @@ def test_drop_leaves_out_fewer_rows_than_a_step_has(
 ) -> None:
     wanted = Counter(mixed_refs(sources, order, epoch).tolist())
     try:
-        plan = plan_epoch(sources, order, epoch)
+        epoch_order = order_epoch(sources, order, epoch)
     except ConfigError:
-        assert sum(wanted.values()) < order.global_batch or order.arrangement is Arrangement.PACK
+        assert sum(wanted.values()) < order.global_batch or order.arrangement is Arrangement.JOIN
         return
-    found = Counter(ref for ranks in rows_of(plan) for row in ranks[0] for ref in row)
+    found = Counter(ref for ranks in rows_of(epoch_order) for row in ranks[0] for ref in row)
     assert not found - wanted
-    assert sum((wanted - found).values()) == plan.report.dropped_clips
-    assert plan.report.rows - plan.steps * order.global_batch < order.global_batch
+    assert sum((wanted - found).values()) == epoch_order.summary.dropped_clips
+    assert epoch_order.summary.rows - epoch_order.steps * order.global_batch < order.global_batch
 
 
 @given(layouts(), orders())
 def test_the_report_counts_what_is_delivered(sources: list[SourceLayout], order: OrderConfig) -> None:
     order = replace(order, global_batch=1) if order.remainder is Remainder.DROP else order
-    plan = plan_epoch(sources, order, 0)
-    steps = [ranks[0] for ranks in rows_of(plan)]
-    lengths = [[int(plan.sequence_latents[row].sum()) for row in step] for step in steps]
+    epoch_order = order_epoch(sources, order, 0)
+    steps = [ranks[0] for ranks in rows_of(epoch_order)]
+    lengths = [[int(epoch_order.sequence_latents[row].sum()) for row in step] for step in steps]
     space = sum((order.row_latents or max(step)) * len(step) for step in lengths)
-    report = plan.report
-    assert (report.clips, report.steps) == (len(plan.refs), len(steps))
-    assert report.padded_rows == sum(not row for step in steps for row in step)
-    assert report.rows + report.repeated_rows + report.padded_rows == len(steps) * order.global_batch
-    assert report.padding_share == pytest.approx(1 - sum(map(sum, lengths)) / space)  # the same sums, once rounded
+    summary = epoch_order.summary
+    assert (summary.clips, summary.steps) == (len(epoch_order.refs), len(steps))
+    assert summary.padded_rows == sum(not row for step in steps for row in step)
+    assert summary.rows + summary.repeated_rows + summary.padded_rows == len(steps) * order.global_batch
+    assert summary.padding_share == pytest.approx(1 - sum(map(sum, lengths)) / space)  # the same sums, once rounded
 
 
 @given(layouts(), orders())
 def test_a_plan_is_a_function_of_its_arguments(sources: list[SourceLayout], order: OrderConfig) -> None:
     order = replace(order, global_batch=1)
     np.random.seed(1)  # noqa: NPY002 - that it changes nothing is the point
-    first = rows_of(plan_epoch(sources, order, 2))
+    first = rows_of(order_epoch(sources, order, 2))
     np.random.seed(2)  # noqa: NPY002
-    assert rows_of(plan_epoch(sources, order, 2)) == first
+    assert rows_of(order_epoch(sources, order, 2)) == first
 
 
-def test_packed_rows_hold_no_more_than_their_length() -> None:
-    order = OrderConfig(global_batch=4, arrangement=Arrangement.PACK, row_latents=LONGEST, pool=8, max_latents=7)
+def test_rows_of_joined_clips_hold_no_more_than_their_length() -> None:
+    order = OrderConfig(global_batch=4, arrangement=Arrangement.JOIN, row_latents=LONGEST, pool=8, max_latents=7)
     latents = np.arange(200, dtype=np.int32) % LONGEST + 1
     sources = [SourceLayout(shard_clips=np.array([200]), latents=latents)]
-    plan = plan_epoch(sources, order, 0)
-    lengths = [plan.sequence_latents[row].sum() for ranks in rows_of(plan) for row in ranks[0]]
+    epoch_order = order_epoch(sources, order, 0)
+    lengths = [epoch_order.sequence_latents[row].sum() for ranks in rows_of(epoch_order) for row in ranks[0]]
     assert max(lengths) <= LONGEST
-    assert plan.sequence_latents.max() == 7
+    assert epoch_order.sequence_latents.max() == 7
     plain = replace(order, arrangement=Arrangement.PLAIN, row_latents=0)
-    assert plan.report.padding_share < plan_epoch(sources, plain, 0).report.padding_share / 2
+    assert epoch_order.summary.padding_share < order_epoch(sources, plain, 0).summary.padding_share / 2
 
 
 def test_buckets_pad_less_than_plain_rows() -> None:
     latents = np.random.default_rng(0).integers(5, 40, 2000).astype(np.int32)
     sources = [SourceLayout(shard_clips=np.full(20, 100), latents=latents)]
     shares = [
-        plan_epoch(sources, OrderConfig(arrangement=arrangement, pool=pool), 0).report.padding_share
+        order_epoch(sources, OrderConfig(arrangement=arrangement, pool=pool), 0).summary.padding_share
         for arrangement, pool in [(Arrangement.PLAIN, 1), (Arrangement.BUCKET, 8), (Arrangement.BUCKET, 32)]
     ]
     assert shares == sorted(shares, reverse=True)
@@ -155,7 +155,7 @@ def test_weights_bring_each_clip_equally_often() -> None:
     order = OrderConfig(global_batch=7, remainder=Remainder.PAD)
     counts: Counter[int] = Counter()
     for epoch in range(4):
-        counts.update(ref for ranks in rows_of(plan_epoch(sources, order, epoch)) for row in ranks[0] for ref in row)
+        counts.update(ref for ranks in rows_of(order_epoch(sources, order, epoch)) for row in ranks[0] for ref in row)
     assert counts == Counter({ref: 2 if ref < 30 else 6 for ref in range(40)})
 
 
@@ -167,24 +167,24 @@ def test_a_world_size_that_does_not_divide_the_batch_is_a_wrong_request(world_si
 
 @pytest.mark.parametrize(("step", "rank"), [(-1, 0), (6, 0), (0, -1), (0, 2)])
 def test_steps_and_ranks_that_are_not_there_are_refused(step: int, rank: int) -> None:
-    plan = plan_epoch(one_source(), OrderConfig(), 0)
+    epoch_order = order_epoch(one_source(), OrderConfig(), 0)
     with pytest.raises(ValueError, match="must exist"):
-        plan.rows(step, rank, 2)
+        epoch_order.rows(step, rank, 2)
 
 
 def test_an_epoch_without_a_step_is_a_wrong_request() -> None:
     with pytest.raises(ConfigError, match="its 5 rows do not fill a global batch of 8; lower global_batch"):
-        plan_epoch(one_source(5), OrderConfig(), 0)
+        order_epoch(one_source(5), OrderConfig(), 0)
     with pytest.raises(ConfigError, match="its 0 rows do not fill"):
-        plan_epoch(one_source(1, weight=0.1), OrderConfig(remainder=Remainder.PAD), 0)
-    assert plan_epoch(one_source(5), OrderConfig(remainder=Remainder.PAD), 0).steps == 1
+        order_epoch(one_source(1, weight=0.1), OrderConfig(remainder=Remainder.PAD), 0)
+    assert order_epoch(one_source(5), OrderConfig(remainder=Remainder.PAD), 0).steps == 1
 
 
 def test_a_clip_longer_than_a_row_is_a_wrong_request_that_says_what_to_set() -> None:
-    order = OrderConfig(arrangement=Arrangement.PACK, row_latents=6)
+    order = OrderConfig(arrangement=Arrangement.JOIN, row_latents=6)
     with pytest.raises(ConfigError, match="set row_latents to at least 9, or max_latents to at most 6"):
-        plan_epoch(one_source(latents=9), order, 0)
-    assert plan_epoch(one_source(latents=9), replace(order, max_latents=6), 0).steps == 6
+        order_epoch(one_source(latents=9), order, 0)
+    assert order_epoch(one_source(latents=9), replace(order, max_latents=6), 0).steps == 6
 
 
 def test_chunk_sizes_are_drawn_for_each_sequence_of_an_epoch() -> None:
@@ -206,5 +206,5 @@ def test_the_plan_of_a_seed_stays_what_it_was() -> None:
         SourceLayout(shard_clips=np.array([4, 3]), latents=np.array([3, 1, 2, 3, 1, 2, 3], np.int32)),
         SourceLayout(shard_clips=np.array([2]), latents=np.array([2, 1], np.int32), weight=1.5),
     ]
-    found = [[row.tolist() for row in plan_epoch(sources, order, 1).rows(step, 0, 1)] for step in range(3)]
+    found = [[row.tolist() for row in order_epoch(sources, order, 1).rows(step, 0, 1)] for step in range(3)]
     assert found == [[[1], [4], [6]], [[8], [5], [3]], [[0], [8], [7]]]

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from wsm_data.loaders.order.stable_hash import Int64Array
 
 
-def pack_rows(lengths: NDArray[np.integer], *, row_latents: int, pool: int) -> tuple[Int64Array, Int64Array]:
+def join_rows(lengths: NDArray[np.integer], *, row_latents: int, pool: int) -> tuple[Int64Array, Int64Array]:
     """Best fit with a bounded pool: at any time the next `pool` clips that have no row yet wait.
 
     A row starts with the clip that has waited longest, so that none waits for ever; then the longest waiting clip that
@@ -21,12 +21,12 @@ def pack_rows(lengths: NDArray[np.integer], *, row_latents: int, pool: int) -> t
     Returns:
         The clips in the order of their rows, int64 [clips], and where each row starts among them, int64 [rows + 1].
     """
-    taken, starts, rows = _pack(lengths.astype(np.int32, copy=False), row_latents, pool)
+    taken, starts, rows = _join(lengths.astype(np.int32, copy=False), row_latents, pool)
     return taken, starts[: rows + 1].copy()
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
-def _pack(lengths: NDArray[np.int32], row_latents: int, pool: int) -> tuple[Int64Array, Int64Array, int]:
+def _join(lengths: NDArray[np.int32], row_latents: int, pool: int) -> tuple[Int64Array, Int64Array, int]:
     """The waiting clips of each length form a queue: `first` and `last` of a length, and who follows a clip."""
     clips = len(lengths)
     follower = np.full(clips, -1, np.int64)
