@@ -12,7 +12,8 @@ from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.files.atomic import write_text
 from wsm_data.files.digest import digest_json
 from wsm_data.files.typed_toml import build_config
-from wsm_data.readers.interndata.containers import Container, Layout
+from wsm_data.readers.registry import source_reader
+from wsm_data.readers.source import Container, SourceReader
 from wsm_data.schema.dataset import DatasetManifest
 
 _ABOUT_THE_PUBLISHER = ("licence", "homepage", "expected_episodes")
@@ -29,6 +30,11 @@ class IndexedSource:
 
     root: Path
     dataset: DatasetManifest
+
+    @property
+    def reader(self) -> SourceReader:
+        """What reads it."""
+        return source_reader(self.dataset)
 
 
 def indexed_source(index: Path) -> IndexedSource:
@@ -69,9 +75,9 @@ def conventions_digest(dataset: DatasetManifest) -> str:
 
 def container_json(container: Container) -> dict[str, Any]:
     """JSON object of a container, for the ledger of the index."""
-    return {**asdict(container), "layout": container.layout.value}
+    return asdict(container)
 
 
 def container_from_json(record: dict[str, Any]) -> Container:
     """Inverse of `container_json`."""
-    return Container(**{**record, "layout": Layout(record["layout"])})
+    return Container(id=record["id"], layout=record["layout"], signature=record["signature"])

@@ -24,9 +24,8 @@ from wsm_data.files.atomic import write_text
 from wsm_data.files.digest import sha256_bytes
 from wsm_data.files.typed_toml import INPUT, SELECTION
 from wsm_data.maps.scene_map import SceneMap, floor_levels, load_scene_map
-from wsm_data.readers.interndata.containers import Container
-from wsm_data.readers.interndata.frames import iter_episode_frames
 from wsm_data.readers.record_table import read_records
+from wsm_data.readers.source import Container
 from wsm_data.schema.arrays import Float32Array
 from wsm_data.schema.episode import EpisodeRecord
 from wsm_data.schema.verdict import Refusal
@@ -157,7 +156,7 @@ def _prepare(
     records = [one for one in read_records(records_path(config.index, scene.container.id)) if one.id.text in units]
     # One clip at a time is encoded before the next is read; several at a time need memory each.
     memory = _video_memory() if config.codec.batch_clips == 1 else None
-    for record, frames in iter_episode_frames(source.root, scene.container, records):
+    for record, frames in source.reader.iter_frames(source.root, scene.container, source.dataset, records):
         unit = units[record.id.text]
         try:
             require_depth_agreement(record, frames, source.dataset)

@@ -20,10 +20,10 @@ from wsm_data.errors import DataError, Reason
 from wsm_data.files.digest import digest_json, sha256_file
 from wsm_data.files.typed_toml import INPUT
 from wsm_data.maps.voxels import save_voxels, voxels_digest, voxels_from_cloud, voxels_from_depth
-from wsm_data.readers.interndata.containers import Container, find_containers
-from wsm_data.readers.interndata.scan import ContainerScan, scan_container
 from wsm_data.readers.manifest import load_dataset
 from wsm_data.readers.record_table import write_records
+from wsm_data.readers.registry import source_reader
+from wsm_data.readers.source import Container, ContainerScan
 from wsm_data.schema.dataset import DatasetManifest
 from wsm_data.schema.episode import EpisodeRecord
 from wsm_data.schema.verdict import Refusal
@@ -62,7 +62,7 @@ def _list_units(config: IndexConfig) -> Sequence[Unit]:
             inputs={"files": container.signature, "dataset": conventions},
             payload=container,
         )
-        for container in find_containers(config.source, dataset)
+        for container in source_reader(dataset).find_containers(config.source, dataset)
     ]
 
 
@@ -78,7 +78,7 @@ def _process(batch: Sequence[Unit], config: IndexConfig, context: StageContext) 
 def _index_container(
     unit: Unit, container: Container, config: IndexConfig, dataset: DatasetManifest, out: Path
 ) -> Outcome:
-    scan = scan_container(config.source, container, dataset, config.depth_sample_every)
+    scan = source_reader(dataset).scan(config.source, container, dataset, config.depth_sample_every)
     kept, refusals = _checked(scan, dataset)
     records = records_path(out, container.id)
     records.parent.mkdir(parents=True, exist_ok=True)

@@ -42,7 +42,7 @@ def trajectory(make_source, run_pipeline, tmp_path_factory):
     dataset = load_dataset("synthetic")
     (container,) = find_containers(source, dataset)
     records = read_records(records_path(run / "index", container.id))
-    record, frames = next(iter_episode_frames(source, container, records[:1]))
+    record, frames = next(iter_episode_frames(source, container, dataset, records[:1]))
     assert record.id == clip.meta.id
     return clip, record, frames, dataset, make_home(seed=0, scene_index=0).mesh.points_m
 

@@ -15,12 +15,12 @@ from wsm_data.codecs.quality import DEPTH_EDGES_M, CodecQuality, clip_quality, d
 from wsm_data.errors import Reason
 from wsm_data.geometry.transform import invert, relative_to_first, transform_points, vectors_from_transforms
 from wsm_data.maps.progress import field_to_mm
-from wsm_data.readers.interndata.frames import EpisodeFrames
 from wsm_data.schema.arrays import BoolArray, Float32Array, Float64Array
 from wsm_data.schema.clip import Clip
 from wsm_data.schema.clip_meta import ClipMeta
 from wsm_data.schema.dataset import DatasetManifest
 from wsm_data.schema.episode import EpisodeRecord
+from wsm_data.schema.frames import EpisodeFrames
 
 QUALITY_STRIDE = 8
 """Of a clip whose codec quality is measured, every n-th frame is."""

@@ -5,18 +5,19 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from wsm_data.codecs.depth import depth_m_from_raw
-from wsm_data.codecs.images import decode_depth
+from wsm_data.codecs.images import depth_codes
 from wsm_data.errors import DataError
 from wsm_data.geometry.camera import unproject
 from wsm_data.geometry.transform import transform_points
 from wsm_data.schema.arrays import Float64Array
 from wsm_data.schema.depth import DepthEncoding, DepthRange
 from wsm_data.schema.episode import EpisodeRecord
+from wsm_data.schema.frames import DepthFrame
 
 
 def fused_points(
     records: Sequence[EpisodeRecord],
-    depth_samples: Mapping[str, tuple[tuple[int, bytes], ...]],
+    depth_samples: Mapping[str, Sequence[tuple[int, DepthFrame]]],
     encoding: DepthEncoding,
 ) -> Iterator[Float64Array]:
     """Points of the sampled depth frames in world coordinates, one float64 [N, 3] array (m) a frame.
@@ -26,14 +27,14 @@ def fused_points(
 
     Args:
         records: trajectories of the scene.
-        depth_samples: (frame number, PNG bytes) by trajectory.
+        depth_samples: (frame number, depth image) by trajectory.
         encoding: how the source stores depth.
     """
     limits = DepthRange()
     for record in records:
-        for frame, data in depth_samples.get(record.id.text, ()):
+        for frame, image in depth_samples.get(record.id.text, ()):
             try:
-                raw = decode_depth(data, f"{record.id.text}, frame {frame}")
+                raw = depth_codes(image, f"{record.id.text}, frame {frame}")
             except DataError:
                 continue
             depth_m = depth_m_from_raw(raw, encoding)

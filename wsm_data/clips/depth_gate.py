@@ -9,13 +9,13 @@ import numpy as np
 from wsm_data.checks.depth_agreement import check_depth_agreement
 from wsm_data.checks.gate import require_kept
 from wsm_data.codecs.depth import depth_m_from_raw
-from wsm_data.codecs.images import decode_depth
+from wsm_data.codecs.images import depth_codes
 from wsm_data.errors import DataError
 from wsm_data.geometry.transform import invert, rotation_angle_rad
-from wsm_data.readers.interndata.frames import EpisodeFrames
 from wsm_data.schema.arrays import Float32Array, Float64Array
 from wsm_data.schema.dataset import DatasetManifest
 from wsm_data.schema.episode import EpisodeRecord
+from wsm_data.schema.frames import DepthFrame, EpisodeFrames
 from wsm_data.schema.verdict import Verdict
 
 _LOG = logging.getLogger(__name__)
@@ -39,14 +39,15 @@ def require_depth_agreement(record: EpisodeRecord, frames: EpisodeFrames, datase
         DataError: `pose.depth_disagree`, naming the camera axes or the offset that would fit; or a frame does not
             decode.
     """
-    pairs = spread_pairs(record, range(record.frame_count))
-    depth_m = {number: _depth_m(record, number, frames.depth[number], dataset) for number in sorted({*chain(*pairs)})}
+    measured = {number: image for number, image in enumerate(frames.depth) if image is not None}
+    pairs = spread_pairs(record, sorted(measured))
+    depth_m = {number: _depth_m(record, number, measured[number], dataset) for number in sorted({*chain(*pairs)})}
     require_kept(check_depth_agreement(record, depth_m, pairs, dataset.camera_axes))
 
 
 def agreeing_records(
     records: Sequence[EpisodeRecord],
-    depth_samples: Mapping[str, tuple[tuple[int, bytes], ...]],
+    depth_samples: Mapping[str, Sequence[tuple[int, DepthFrame]]],
     dataset: DatasetManifest,
 ) -> list[EpisodeRecord]:
     """The trajectories whose depth samples do not contradict their poses.
@@ -56,7 +57,7 @@ def agreeing_records(
 
     Args:
         records: trajectories of a scene.
-        depth_samples: (frame number, PNG bytes) by trajectory.
+        depth_samples: (frame number, depth image) by trajectory.
         dataset: conventions of the source.
     """
     kept = []
@@ -69,7 +70,7 @@ def agreeing_records(
     return kept
 
 
-def _samples_verdict(record: EpisodeRecord, samples: Mapping[int, bytes], dataset: DatasetManifest) -> Verdict:
+def _samples_verdict(record: EpisodeRecord, samples: Mapping[int, DepthFrame], dataset: DatasetManifest) -> Verdict:
     pairs = spread_pairs(record, sorted(samples))
     depth_m: dict[int, Float32Array] = {}
     for number in sorted({*chain(*pairs)}):
@@ -115,5 +116,5 @@ def _way_m(record: EpisodeRecord) -> Float64Array:
     return way_m
 
 
-def _depth_m(record: EpisodeRecord, number: int, data: bytes, dataset: DatasetManifest) -> Float32Array:
-    return depth_m_from_raw(decode_depth(data, f"{record.id.text}, depth frame {number}"), dataset.depth)
+def _depth_m(record: EpisodeRecord, number: int, image: DepthFrame, dataset: DatasetManifest) -> Float32Array:
+    return depth_m_from_raw(depth_codes(image, f"{record.id.text}, depth frame {number}"), dataset.depth)

@@ -7,12 +7,13 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from wsm_data.codecs.base import TEMPORAL_RATIO
-from wsm_data.codecs.depth import log_depth_table, measured_table
-from wsm_data.codecs.images import decode_depth, decode_rgb
+from wsm_data.codecs.depth import UNMEASURED, log_depth_table, measured_table
+from wsm_data.codecs.images import depth_codes, rgb_pixels
 from wsm_data.codecs.resize import resize_colour, resize_depth
 from wsm_data.errors import DataError, Reason
 from wsm_data.schema.arrays import BoolArray, Float32Array, Uint8Array, Uint16Array
 from wsm_data.schema.depth import DepthEncoding, DepthRange
+from wsm_data.schema.frames import DepthFrame, RgbFrame
 
 _Image = TypeVar("_Image", Uint8Array, Uint16Array)
 
@@ -41,17 +42,17 @@ class VideoMemory:
 
 
 def rgb_video(
-    frames: Sequence[bytes],
+    frames: Sequence[RgbFrame],
     width: int,
     height: int,
     where: str,
     length: int | None = None,
     memory: VideoMemory | None = None,
 ) -> Float32Array:
-    """Decode and resize the JPEG frames of an episode.
+    """Decode and resize the colour frames of an episode.
 
     Args:
-        frames: bytes of the T files in time order.
+        frames: the T colour images in time order.
         width: encoded width, px.
         height: encoded height, px.
         where: the episode, for messages; the number of the frame is added to it.
@@ -66,15 +67,15 @@ def rgb_video(
     """
     memory = memory or VideoMemory()
     video = memory.array("rgb", (_padded_count(frames, length), height, width, 3), np.float32)
-    decoded = (decode_rgb(data, _frame_name(where, "colour", index)) for index, data in enumerate(frames))
-    for index, rgb_u8 in enumerate(_of_one_size(decoded, where, "colour")):
+    decoded = ((index, rgb_pixels(one, _frame_name(where, "colour", index))) for index, one in enumerate(frames))
+    for index, rgb_u8 in _of_one_size(decoded, where, "colour"):
         resize_colour(rgb_u8, video[index])
     video[len(frames) :] = video[len(frames) - 1]
     return video
 
 
 def depth_video(
-    frames: Sequence[bytes],
+    frames: Sequence[DepthFrame | None],
     encoding: DepthEncoding,
     depth_range: DepthRange,
     width: int,
@@ -86,7 +87,7 @@ def depth_video(
     """Decode, resize and normalise the depth frames of an episode.
 
     Args:
-        frames: bytes of the T files in time order.
+        frames: the T depth images in time order, None where a frame has none: nothing is measured there.
         encoding: how the source stores depth.
         depth_range: metric range of the log-depth normalisation.
         width: encoded width, px.
@@ -107,8 +108,14 @@ def depth_video(
     memory = memory or VideoMemory()
     channel = memory.array("depth", (_padded_count(frames, length), height, width), np.float32)
     valid = memory.array("valid", channel.shape, np.bool_)
-    decoded = (decode_depth(data, _frame_name(where, "depth", index)) for index, data in enumerate(frames))
-    for index, raw_u16 in enumerate(_of_one_size(decoded, where, "depth")):
+    absent = [index for index, one in enumerate(frames) if one is None]
+    channel[absent], valid[absent] = UNMEASURED, False
+    decoded = (
+        (index, depth_codes(one, _frame_name(where, "depth", index)))
+        for index, one in enumerate(frames)
+        if one is not None
+    )
+    for index, raw_u16 in _of_one_size(decoded, where, "depth"):
         resize_depth(raw_u16, normalised, measured, channel[index], valid[index])
     for video in (channel, valid):
         video[len(frames) :] = video[len(frames) - 1]
@@ -145,7 +152,7 @@ def pad_frames(video: np.ndarray, frames: int) -> np.ndarray:
     return padded
 
 
-def _padded_count(frames: Sequence[bytes], length: int | None) -> int:
+def _padded_count(frames: Sequence[RgbFrame | DepthFrame | None], length: int | None) -> int:
     count = len(frames) if length is None else length
     if not 0 < len(frames) <= count:
         raise ValueError(f"a video of {count} frames is made of 1 to {count} images, found {len(frames)}")
@@ -160,16 +167,16 @@ def _frame_name(where: str, kind: str, index: int) -> str:
     return f"{where}, {kind} frame {index}"
 
 
-def _of_one_size(images: Iterator[_Image], where: str, kind: str) -> Iterator[_Image]:
-    """Pass the images on; refuse the first whose height or width differs from that of frame 0."""
-    first: tuple[int, ...] | None = None
-    for index, image in enumerate(images):
+def _of_one_size(images: Iterator[tuple[int, _Image]], where: str, kind: str) -> Iterator[tuple[int, _Image]]:
+    """Pass numbered images on; refuse the first whose height or width differs from that of the first one."""
+    first: tuple[int, tuple[int, ...]] | None = None
+    for index, image in images:
         size = image.shape[:2]
-        first = first or size
-        if size != first:
+        first = first or (index, size)
+        if size != first[1]:
             message = (
                 f"{_frame_name(where, kind, index)}: all frames of an episode must have one size, found "
-                f"{size[1]}x{size[0]} px after {first[1]}x{first[0]} px in frame 0; repair the source"
+                f"{size[1]}x{size[0]} px after {first[1][1]}x{first[1][0]} px in frame {first[0]}; repair the source"
             )
             raise DataError(Reason.FRAME_SIZE_MISMATCH, message, {"frame": index, "size_px": [size[1], size[0]]})
-        yield image
+        yield index, image

@@ -16,6 +16,9 @@ from wsm_data.schema.depth import DepthEncoding, DepthRange
 _RAW_CODES = 1 << 16
 _FULL_SHARE = 255
 
+UNMEASURED = 1.0
+"""Normalised depth of a pixel without a measurement: that of d_max."""
+
 
 def normalise_depth(depth_m: NDArray[np.floating], depth_range: DepthRange) -> Float32Array:
     """Depth in metres, any shape, to 2u - 1 in [-1, 1]; what is 0, negative or not finite becomes +1."""

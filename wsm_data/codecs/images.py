@@ -1,4 +1,4 @@
-"""From the bytes of one stored frame to its pixels."""
+"""From one stored frame to its pixels."""
 
 import cv2
 import numpy as np
@@ -6,7 +6,34 @@ import simplejpeg
 
 from wsm_data.codecs.png16 import decode_png16
 from wsm_data.errors import DataError, Reason
-from wsm_data.schema.arrays import Uint8Array, Uint16Array
+from wsm_data.schema.arrays import Uint8Array, Uint16Array, require_array
+from wsm_data.schema.frames import DepthFrame, RgbFrame
+
+
+def rgb_pixels(frame: RgbFrame, where: str) -> Uint8Array:
+    """The pixels of a colour frame, rgb_u8 [H, W, 3]: decoded where it is a file, itself where its reader did that.
+
+    Raises:
+        DataError: FRAME_UNDECODABLE.
+        ValueError: pixels of another type or shape: a reader's fault.
+    """
+    if isinstance(frame, bytes):
+        return decode_rgb(frame, where)
+    require_array(where, frame, np.uint8, (None, None, 3))
+    return frame
+
+
+def depth_codes(frame: DepthFrame, where: str) -> Uint16Array:
+    """The raw codes of a depth frame, uint16 [H, W]: decoded where it is a file, itself where its reader did that.
+
+    Raises:
+        DataError: FRAME_UNDECODABLE, DEPTH_NOT_16_BIT.
+        ValueError: codes of another type or shape: a reader's fault.
+    """
+    if isinstance(frame, bytes):
+        return decode_depth(frame, where)
+    require_array(where, frame, np.uint16, (None, None))
+    return frame
 
 
 def decode_rgb(data: bytes, where: str) -> Uint8Array:

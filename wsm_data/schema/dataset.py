@@ -61,6 +61,7 @@ class DatasetManifest:
 
     Attributes:
         name: name of the data set, stored in every clip.
+        reader: the kind of source, as `readers/registry.py` names it.
         licence: licence of the source, as its publisher states it.
         homepage: where the source is described.
         camera_axes: axes of the stored camera poses: `opengl` (x right, y up, z backward) or `opencv`.
@@ -75,6 +76,7 @@ class DatasetManifest:
     """
 
     name: str
+    reader: str = "interndata"
     licence: str
     homepage: str = ""
     camera_axes: str = "opengl"

@@ -18,11 +18,11 @@ import pyarrow.parquet as pq
 
 from wsm_data.geometry.camera import T_OPENGL_OPENCV, pixel_rays
 from wsm_data.geometry.transform import invert
-from wsm_data.readers.interndata.frames import EpisodeFrames
 from wsm_data.schema.camera import Intrinsics
 from wsm_data.schema.dataset import DatasetManifest
 from wsm_data.schema.depth import DepthEncoding
 from wsm_data.schema.episode import EpisodeRecord
+from wsm_data.schema.frames import EpisodeFrames
 from wsm_data.schema.identity import EpisodeId
 
 INTRINSICS = Intrinsics(fx=40.0, fy=40.0, cx=31.5, cy=23.5, width=64, height=48)

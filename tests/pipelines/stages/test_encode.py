@@ -22,6 +22,7 @@ from wsm_data.codecs.registry import CodecConfig
 from wsm_data.errors import ConfigError
 from wsm_data.files.digest import sha256_file, xxh3_128
 from wsm_data.files.typed_toml import build_config
+from wsm_data.readers.interndata.reader import INTERNDATA
 from wsm_data.schema.identity import EpisodeId
 from wsm_data.shards.fragment import fragment_path, read_fragment_info
 
@@ -116,7 +117,7 @@ def test_a_reader_that_converts_otherwise_makes_every_clip_anew(mapped, changed,
     """What is stored is the same; its content digest cannot tell."""
     mapped.run("encode")
     before, clips = mapped.inputs("encode"), clip_digests(mapped)
-    scan_as_before = index.scan_container
+    scan_as_before = INTERNDATA.scan
 
     def scan(*arguments):
         found = scan_as_before(*arguments)
@@ -124,7 +125,7 @@ def test_a_reader_that_converts_otherwise_makes_every_clip_anew(mapped, changed,
             found, records=[replace(one, camera_pitch_rad=one.camera_pitch_rad + 1e-9) for one in found.records]
         )
 
-    monkeypatch.setattr(index, "scan_container", scan)
+    monkeypatch.setattr(index, "source_reader", lambda _dataset: replace(INTERNDATA, scan=scan))
     shutil.rmtree(mapped.folder("index"))
     again(mapped)
     assert changed(before, mapped.inputs("encode")) == {unit: {"trajectory"} for unit in UNITS}

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import simplejpeg
 
-from wsm_data.codecs.images import decode_depth, decode_rgb
+from wsm_data.codecs.images import decode_depth, decode_rgb, depth_codes, rgb_pixels
 from wsm_data.codecs.png16 import decode_png16
 from wsm_data.errors import DataError, Reason
 
@@ -88,3 +88,15 @@ def test_a_png_of_a_rare_form_is_still_decoded(depth_frames, depth_images):
     rare = depth_frames[0][:33] + chunk + depth_frames[0][33:]
     assert decode_png16(rare) is None
     assert np.array_equal(decode_depth(rare, WHERE), depth_images[0])
+
+
+def test_pixels_that_a_reader_decoded_pass_as_they_are():
+    rgb_u8, raw_u16 = np.zeros((4, 6, 3), np.uint8), np.zeros((4, 6), np.uint16)
+    assert rgb_pixels(rgb_u8, "here") is rgb_u8
+    assert depth_codes(raw_u16, "here") is raw_u16
+
+
+@pytest.mark.parametrize(("read", "pixels"), [(rgb_pixels, np.zeros((4, 6, 3))), (depth_codes, np.zeros((4, 6), "u1"))])
+def test_pixels_of_another_type_are_the_readers_fault(read, pixels):
+    with pytest.raises(ValueError, match=f"here must be .* found {pixels.dtype}"):
+        read(pixels, "here")

@@ -14,8 +14,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from wsm_data.readers.interndata.containers import Container, find_containers
-from wsm_data.readers.interndata.scan import ContainerScan, scan_container
+from wsm_data.readers.interndata.containers import find_containers
+from wsm_data.readers.interndata.scan import scan_container
+from wsm_data.readers.source import Container, ContainerScan
 from wsm_data.schema.dataset import DatasetManifest
 from wsm_data.schema.depth import DepthEncoding
 

@@ -3,13 +3,14 @@
 import logging
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
 from wsm_data.errors import ConfigError
 from wsm_data.files.digest import digest_json
+from wsm_data.readers.source import Container
 from wsm_data.readers.unreadable import error_name
 from wsm_data.schema.dataset import DatasetManifest
 
@@ -20,6 +21,9 @@ CONTENT_FOLDERS = ("data", "meta", "videos")
 
 SCENE_CLOUD = "meta/pointcloud.ply"
 """Where a scene keeps its cloud; trajectory folders without one of their own share it."""
+
+EXPECTS = "<group>/<scene>.tar.gz, <group>/<scene>/data or <group>/<scene>/<trajectory>/data"
+"""The three layouts as a person would look for them."""
 
 _ARCHIVE = re.compile(r"(?P<scene>.+?)\.(tar\.gz|tgz|tar|tar\.[a-z0-9]+|zip|gz)")
 _UNFINISHED = re.compile(
@@ -33,31 +37,6 @@ class Layout(StrEnum):
     SCENE_ARCHIVE = "scene_archive"
     SCENE_FOLDER = "scene_folder"
     TRAJECTORY_FOLDER = "trajectory_folder"
-
-
-@dataclass(frozen=True, kw_only=True)
-class Container:
-    """One archive or folder: the unit that is scanned as a whole.
-
-    Attributes:
-        id: path relative to the source root, with `/`.
-        layout: how it is read.
-        path: the same as `id`, relative to the source root; kept apart so that an id is never taken for a path.
-        group: dataset group, the first folder of the path.
-        scene: name of the scene, without the endings of an archive.
-        episode: name of the trajectory folder; None for scenes.
-        signature: digest of (relative name, size, mtime in ns) of all its files: the cheap test for "was anything
-            touched"; it says nothing about content. A file that cannot be looked at counts with the system's error. The
-            cloud of the scene counts with each of its trajectories.
-    """
-
-    id: str
-    layout: Layout
-    path: str
-    group: str
-    scene: str
-    episode: str | None
-    signature: str
 
 
 def find_containers(source: Path, dataset: DatasetManifest) -> list[Container]:
@@ -77,17 +56,43 @@ def find_containers(source: Path, dataset: DatasetManifest) -> list[Container]:
             f"but {source} {'is a file' if source.exists() else 'does not exist'}"
         )
     try:
-        groups = [(group, _entries(group)) for group in _entries(source) if _is_folder(group)]
+        groups = [_entries(group) for group in _entries(source) if _is_folder(group)]
     except OSError as error:
         message = f"the source of data set {dataset.name!r} and its groups must be folders that can be listed"
         raise ConfigError(f"{message}, but {error.filename}: {error.strerror}") from error
-    containers = [found for group, entries in groups for found in _in_group(source, group.name, entries)]
+    containers = [found for entries in groups for found in _in_group(source, entries)]
     if not containers:
         raise ConfigError(
             f"the source of data set {dataset.name!r} is empty: no <group>/<scene> folder and no "
             f"<group>/<scene>.tar.gz below {source}; the source is the folder that holds the groups"
         )
     return sorted(containers, key=lambda container: container.id)
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where in a source a container stands.
+
+    Attributes:
+        group: dataset group, the first folder of the path.
+        scene: name of the scene, without the endings of an archive.
+        episode: name of the trajectory folder; None for scenes.
+    """
+
+    group: str
+    scene: str
+    episode: str | None
+
+
+def place_of(container: Container) -> Place:
+    """Group, scene and trajectory of a container, as its path says."""
+    group, scene, *episode = container.id.split("/")
+    if container.layout == Layout.SCENE_ARCHIVE:
+        unfinished = _UNFINISHED.fullmatch(scene)
+        whole = unfinished["whole"] if unfinished else scene
+        archive = _ARCHIVE.fullmatch(whole)
+        scene = archive["scene"] if archive else whole
+    return Place(group, scene, episode[0] if episode else None)
 
 
 def is_unfinished(name: str) -> bool:
@@ -116,46 +121,36 @@ def _leads_nowhere(entry: os.DirEntry[str]) -> bool:
     return False
 
 
-def _in_group(source: Path, group: str, entries: list[os.DirEntry[str]]) -> Iterator[Container]:
+def _in_group(source: Path, entries: list[os.DirEntry[str]]) -> Iterator[Container]:
     for entry in entries:
-        unfinished = _UNFINISHED.fullmatch(entry.name)
-        whole = unfinished["whole"] if unfinished else entry.name
-        archive = _ARCHIVE.fullmatch(whole)
         if _is_folder(entry):
-            yield from _in_scene(source, group, entry)
-        elif archive or unfinished:
-            signature = digest_json([_file_line("", entry)])
-            scene = archive["scene"] if archive else whole
-            yield _container(source, entry.path, Layout.SCENE_ARCHIVE, group, scene, None, signature)
+            yield from _in_scene(source, entry)
+        elif _ARCHIVE.fullmatch(entry.name) or is_unfinished(entry.name):
+            yield _container(source, entry, Layout.SCENE_ARCHIVE, [_file_line("", entry)])
         elif _leads_nowhere(entry):
-            signature = digest_json([_file_line("", entry)])
-            yield _container(source, entry.path, Layout.SCENE_FOLDER, group, entry.name, None, signature)
+            yield _container(source, entry, Layout.SCENE_FOLDER, [_file_line("", entry)])
         else:
             _log.warning("%s is neither a scene folder nor an archive; it is not read", entry.path)
 
 
-def _in_scene(source: Path, group: str, scene: os.DirEntry[str]) -> Iterator[Container]:
+def _in_scene(source: Path, scene: os.DirEntry[str]) -> Iterator[Container]:
     try:
         folders = [entry for entry in _entries(scene) if _is_folder(entry) or _leads_nowhere(entry)]
     except OSError as error:  # listed all the same: reading it says why not
-        signature = digest_json([error_name(error)])
-        yield _container(source, scene.path, Layout.SCENE_FOLDER, group, scene.name, None, signature)
+        yield _container(source, scene, Layout.SCENE_FOLDER, [error_name(error)])
         return
     trajectories = [entry for entry in folders if entry.name not in CONTENT_FOLDERS]
     if not trajectories or any(entry.name in ("data", "videos") for entry in folders):
-        signature = digest_json(_content_lines(scene))
-        yield _container(source, scene.path, Layout.SCENE_FOLDER, group, scene.name, None, signature)
+        yield _container(source, scene, Layout.SCENE_FOLDER, _content_lines(scene))
     cloud = _scene_cloud_line(scene)
     for entry in trajectories:
-        signature = digest_json([*_content_lines(entry), *cloud])
-        yield _container(source, entry.path, Layout.TRAJECTORY_FOLDER, group, scene.name, entry.name, signature)
+        yield _container(source, entry, Layout.TRAJECTORY_FOLDER, [*_content_lines(entry), *cloud])
 
 
-def _container(
-    source: Path, path: str, layout: Layout, group: str, scene: str, episode: str | None, signature: str
-) -> Container:
-    name = Path(path).relative_to(source).as_posix()
-    return Container(id=name, layout=layout, path=name, group=group, scene=scene, episode=episode, signature=signature)
+def _container(source: Path, entry: os.DirEntry[str], layout: Layout, lines: Sequence[object]) -> Container:
+    """The container at `entry`; the cloud of its scene is among the lines of a trajectory folder."""
+    id_ = Path(entry.path).relative_to(source).as_posix()
+    return Container(id=id_, layout=layout, signature=digest_json(list(lines)))
 
 
 def _content_lines(folder: os.DirEntry[str]) -> list[list[object]]:

@@ -1,33 +1,22 @@
 """The second pass over a container: the image bytes of whole episodes, each checked against the first pass."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from wsm_data.errors import DataError, IntegrityError
 from wsm_data.files.digest import xxh3_128
-from wsm_data.readers.interndata.containers import Container, Layout
+from wsm_data.readers.interndata.containers import Layout
 from wsm_data.readers.interndata.record import digest_frames
 from wsm_data.readers.interndata.scene_files import iter_members
+from wsm_data.readers.source import Container
 from wsm_data.readers.unreadable import read_file
+from wsm_data.schema.dataset import DatasetManifest
 from wsm_data.schema.episode import EpisodeRecord
-
-
-@dataclass(frozen=True, kw_only=True)
-class EpisodeFrames:
-    """The compressed images of an episode in time order.
-
-    Attributes:
-        rgb: T JPEG files.
-        depth: T PNG files.
-    """
-
-    rgb: tuple[bytes, ...]
-    depth: tuple[bytes, ...]
+from wsm_data.schema.frames import EpisodeFrames
 
 
 def iter_episode_frames(
-    source: Path, container: Container, records: Sequence[EpisodeRecord]
+    source: Path, container: Container, dataset: DatasetManifest, records: Sequence[EpisodeRecord]
 ) -> Iterator[tuple[EpisodeRecord, EpisodeFrames]]:
     """Yield the images of the wanted episodes of a container, each episode as soon as it is complete.
 
@@ -39,13 +28,14 @@ def iter_episode_frames(
         IntegrityError: the images are not those of the first pass: the source changed since.
         ValueError: a record belongs to another container.
     """
+    del dataset  # files are given as they are stored: no convention applies
     for record in records:
         if record.container != container.id:
             raise ValueError(f"{record.id.text} is in {record.container}, not in {container.id}")
-    if container.layout is Layout.SCENE_ARCHIVE:
+    if container.layout == Layout.SCENE_ARCHIVE:
         yield from _from_archive(source, container, records)
     else:
-        yield from _from_folder(source / container.path, records)
+        yield from _from_folder(source / container.id, records)
 
 
 def _from_folder(root: Path, records: Sequence[EpisodeRecord]) -> Iterator[tuple[EpisodeRecord, EpisodeFrames]]:
@@ -55,7 +45,7 @@ def _from_folder(root: Path, records: Sequence[EpisodeRecord]) -> Iterator[tuple
             depth = tuple(read_file(f"{root}/{name}", f"{record.container}:{name}") for name in record.depth_members)
         except DataError as error:
             raise _changed(record.container, error.message) from error
-        yield record, _verified(record, EpisodeFrames(rgb=rgb, depth=depth))
+        yield record, _verified(record, rgb, depth)
 
 
 def _from_archive(
@@ -75,7 +65,7 @@ def _from_archive(
                 del waiting[record.id]
                 rgb = tuple(held.pop(name) for name in record.rgb_members)
                 depth = tuple(held.pop(name) for name in record.depth_members)
-                yield record, _verified(record, EpisodeFrames(rgb=rgb, depth=depth))
+                yield record, _verified(record, rgb, depth)
                 if not waiting:
                     return
     except DataError as error:
@@ -84,11 +74,11 @@ def _from_archive(
     raise _changed(container.id, f"images of {', '.join(absent[:3])} are gone ({len(absent)} episodes)")
 
 
-def _verified(record: EpisodeRecord, frames: EpisodeFrames) -> EpisodeFrames:
-    digest = digest_frames([xxh3_128(image) for image in frames.rgb], [xxh3_128(image) for image in frames.depth])
+def _verified(record: EpisodeRecord, rgb: tuple[bytes, ...], depth: tuple[bytes, ...]) -> EpisodeFrames:
+    digest = digest_frames([xxh3_128(image) for image in rgb], [xxh3_128(image) for image in depth])
     if digest != record.frames_digest:
         raise _changed(record.container, f"the images of {record.id.text} have other bytes")
-    return frames
+    return EpisodeFrames(rgb=rgb, depth=depth)
 
 
 def _changed(container: str, what: str) -> IntegrityError:

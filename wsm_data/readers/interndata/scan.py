@@ -1,49 +1,21 @@
 """The first pass over a container: what is in it, what of it can be used, and why the rest cannot."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from wsm_data.errors import DataError, Reason
-from wsm_data.readers.interndata.containers import Container, Layout
+from wsm_data.readers.interndata.containers import EXPECTS, Layout, place_of
 from wsm_data.readers.interndata.contents import Contents, FolderContents, FrameKey, read_contents
 from wsm_data.readers.interndata.naming import episode_name
 from wsm_data.readers.interndata.path_points import without_path
 from wsm_data.readers.interndata.record import build_record, episode_numbers
+from wsm_data.readers.source import Container, ContainerScan, DepthSample
 from wsm_data.schema.dataset import CloudColours, DatasetManifest
 from wsm_data.schema.episode import EpisodeRecord
 from wsm_data.schema.identity import EpisodeId
 from wsm_data.schema.point_cloud import PointCloud
 from wsm_data.schema.verdict import Refusal
-
-DepthSample = tuple[int, bytes]
-"""A frame's index in its episode, and the bytes of its depth PNG."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class ContainerScan:
-    """What one pass over a container found.
-
-    Attributes:
-        records: the usable episodes, by id.
-        refusals: one for each episode that is not, by id; the usable ones go on.
-        cloud: the points of the scene, None where there is no cloud or it is damaged.
-        cloud_refusal: why the cloud cannot be used, None where there is none or it is whole.
-        depth_samples: episode text to every n-th depth image, for a map from depth; empty unless the container has
-            no cloud at all.
-        bytes_read: bytes of the files that were looked at.
-        frames: frames of the usable episodes.
-    """
-
-    records: tuple[EpisodeRecord, ...]
-    refusals: tuple[Refusal, ...]
-    cloud: PointCloud | None
-    cloud_refusal: Refusal | None
-    depth_samples: Mapping[str, tuple[DepthSample, ...]]
-    bytes_read: int
-    frames: int
 
 
 def scan_container(
@@ -84,15 +56,15 @@ def scan_container(
         cloud_refusal=cloud_refusal,
         depth_samples={} if contents.has_cloud else {text: samples[text] for text in sorted(records)},
         bytes_read=contents.bytes_read,
-        frames=sum(record.frame_count for record in records.values()),
     )
 
 
 def _episodes(container: Container, contents: Contents) -> list[tuple[EpisodeId, FolderContents, int]]:
     """All episodes of a container, usable or not, in the order of their folders and numbers."""
+    place = place_of(container)
     found = []
     for name, folder in sorted(contents.folders.items()):
-        trajectory = container.episode if container.layout is Layout.TRAJECTORY_FOLDER else name
+        trajectory = place.episode if container.layout == Layout.TRAJECTORY_FOLDER else name
         numbers = episode_numbers(folder, in_trajectory=bool(trajectory), alone=len(contents.folders) == 1)
         if trajectory and len(numbers) > 1:
             raise DataError(
@@ -102,13 +74,13 @@ def _episodes(container: Container, contents: Contents) -> list[tuple[EpisodeId,
             )
         for number in numbers:
             episode = episode_name(trajectory) if trajectory else f"{number:06d}"
-            found.append((EpisodeId(container.group, container.scene, episode), folder, number))
+            found.append((EpisodeId(place.group, place.scene, episode), folder, number))
     if not found:
         raise DataError(
             Reason.CONTAINER_NO_EPISODES,
             f"{container.id} must hold a scene or a trajectory (data/chunk-*/episode_*.parquet and images below "
             "videos/), found no episode; remove or complete it, or correct the source: it is the folder that holds the "
-            "groups, with <group>/<scene>.tar.gz, <group>/<scene>/data or <group>/<scene>/<trajectory>/data below it",
+            f"groups, with {EXPECTS} below it",
         )
     return found
 
@@ -137,7 +109,7 @@ def _cloud(container: Container, contents: Contents, colours: CloudColours) -> t
         if isinstance(cloud, DataError):
             return None, Refusal.from_error(container.id, container.id, cloud)
         if name is not None and cloud is not None:
-            shows_path = _shows_path(name, bool(trajectory) or container.layout is Layout.TRAJECTORY_FOLDER)
+            shows_path = _shows_path(name, bool(trajectory) or container.layout == Layout.TRAJECTORY_FOLDER)
             clouds.append(without_path(cloud, colours) if shows_path else cloud)
     if len(clouds) > 1:
         xyz_m = np.concatenate([cloud.xyz_m for cloud in clouds])

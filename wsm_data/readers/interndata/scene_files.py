@@ -7,7 +7,8 @@ from pathlib import Path
 
 from wsm_data.errors import DataError, Reason
 from wsm_data.readers.archive.tar_walk import Member, walk_tar
-from wsm_data.readers.interndata.containers import CONTENT_FOLDERS, SCENE_CLOUD, Container, Layout, is_unfinished
+from wsm_data.readers.interndata.containers import CONTENT_FOLDERS, SCENE_CLOUD, Layout, is_unfinished
+from wsm_data.readers.source import Container
 from wsm_data.readers.unreadable import read_file, refusing_unreadable
 
 _READ_FOLDER = re.compile(r"data|meta|videos|(data|videos)/[^/]+|videos/[^/]+/observation\.images\.(rgb|depth)")
@@ -23,15 +24,15 @@ def iter_members(source: Path, container: Container, wanted: Callable[[str], boo
     Raises:
         DataError: an `archive.*` reason, `container.several_scenes`, or `file.unreadable`.
     """
-    if container.layout is Layout.SCENE_ARCHIVE:
+    if container.layout == Layout.SCENE_ARCHIVE:
         yield from _from_archive(source, container, wanted)
     else:
-        yield from _from_folder(source / container.path, container.id, wanted)
+        yield from _from_folder(source / container.id, container.id, wanted)
 
 
 def scene_cloud(source: Path, container: Container) -> Member | None:
     """The cloud of the scene that a trajectory folder lies in; None where the scene has none."""
-    path = (source / container.path).parent / SCENE_CLOUD
+    path = (source / container.id).parent / SCENE_CLOUD
     if not os.path.lexists(path):
         return None
     return _member(str(path), f"../{SCENE_CLOUD}", f"{container.id}:../{SCENE_CLOUD}")
@@ -76,7 +77,7 @@ def _member(path: str, name: str, where: str) -> Member:
 
 
 def _from_archive(source: Path, container: Container, wanted: Callable[[str], bool]) -> Iterator[Member]:
-    if is_unfinished(container.path):
+    if is_unfinished(container.id):
         raise DataError(
             Reason.ARCHIVE_TRUNCATED,
             f"{container.id}: an archive must be complete, and by its name this is a download that was not finished; "
@@ -99,7 +100,7 @@ def _from_archive(source: Path, container: Container, wanted: Callable[[str], bo
         inside = relative(name)
         return inside is not None and wanted(inside)
 
-    for member in walk_tar(source / container.path, container.id, is_wanted):
+    for member in walk_tar(source / container.id, container.id, is_wanted):
         yield Member(relative(member.name) or member.name, member.size, member.data)
         if len(roots) > 1:
             break

@@ -4,7 +4,7 @@ import os
 import pytest
 
 from wsm_data.errors import ConfigError
-from wsm_data.readers.interndata.containers import Layout, find_containers
+from wsm_data.readers.interndata.containers import Layout, Place, find_containers, place_of
 
 
 def refuse_listing(monkeypatch, name):
@@ -34,8 +34,10 @@ def test_mixed_layouts_in_one_tree_are_all_found(build, tmp_path, dataset):
         ("gibson_d435i/Acker.ville.tar.gz", Layout.SCENE_ARCHIVE),
         ("gibson_d435i/Acker.ville/trajectory_01", Layout.TRAJECTORY_FOLDER),
     ]
-    assert {(container.group, container.scene) for container in found.values()} == {("gibson_d435i", "Acker.ville")}
-    assert found["gibson_d435i/Acker.ville/trajectory_01"].episode == "trajectory_01"
+    assert {place_of(container) for container in found.values()} == {
+        Place("gibson_d435i", "Acker.ville", None),
+        Place("gibson_d435i", "Acker.ville", "trajectory_01"),
+    }
 
 
 def test_a_scene_of_trajectory_folders_alone_is_no_scene_folder(build, tmp_path, dataset):
@@ -151,7 +153,7 @@ def test_an_unfinished_download_is_listed_and_not_passed_over(tmp_path, dataset,
     (tmp_path / "group").mkdir()
     (tmp_path / "group" / name).write_bytes(b"")
     (container,) = find_containers(tmp_path, dataset)
-    assert (container.id, container.scene, container.layout) == (f"group/{name}", scene, Layout.SCENE_ARCHIVE)
+    assert (container.id, place_of(container).scene, container.layout) == (f"group/{name}", scene, Layout.SCENE_ARCHIVE)
 
 
 def test_the_cloud_of_a_scene_is_signed_with_each_of_its_trajectories(build, tmp_path, dataset):

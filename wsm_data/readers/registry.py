@@ -1,0 +1,25 @@
+"""The kinds of source by name; a new kind is one more entry."""
+
+from wsm_data.errors import ConfigError
+from wsm_data.files.typed_toml import did_you_mean
+from wsm_data.readers.interndata.reader import INTERNDATA
+from wsm_data.readers.source import SourceReader
+from wsm_data.schema.dataset import DatasetManifest
+
+READERS: tuple[SourceReader, ...] = (INTERNDATA,)
+
+
+def source_reader(dataset: DatasetManifest) -> SourceReader:
+    """The reader that a manifest names.
+
+    Raises:
+        ConfigError: there is none of that name.
+    """
+    for reader in READERS:
+        if reader.name == dataset.reader:
+            return reader
+    known = [reader.name for reader in READERS]
+    raise ConfigError(
+        f"the manifest of {dataset.name!r} names the reader {dataset.reader!r}, which does not exist; "
+        f"{did_you_mean(dataset.reader, known)}"
+    )
