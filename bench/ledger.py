@@ -13,8 +13,7 @@ from pathlib import Path
 import numpy as np
 from reporting import machine, machine_line, table, write_results
 
-from wsm_data.files.jsonlines import canonical_json, line_appender
-from wsm_data.loaders.ledger.files import STEP, framed
+from wsm_data.files.jsonlines import canonical_json
 from wsm_data.loaders.ledger.writer import LedgerWriter
 
 CLIPS = 8  # of a rank's step
@@ -32,13 +31,12 @@ def seconds_each(count: int, work: Callable[[int], object]) -> float:
 
 def measure(folder: Path) -> dict[str, list[float]]:
     """Seconds of one record or one copy in each round; all contestants take part in every round."""
-    seconds: dict[str, list[float]] = {name: [] for name in ("ledger", "write", "json", "flushed", "copy")}
+    seconds: dict[str, list[float]] = {name: [] for name in ("ledger", "write", "flushed", "copy")}
     source, target = np.ones(STEP_BYTES, np.uint8), np.empty(STEP_BYTES, np.uint8)
-    data = framed(STEP, bytes(16) + REFS.tobytes())
+    data = canonical_json({"epoch": 0, "step": RECORDS, "refs": REFS.tolist()}).encode() + bytes(28)  # and a checksum
     with (
         LedgerWriter(folder / "ledger", {}, 0, 1) as ledger,
         (folder / "bare").open("wb", buffering=0) as bare,
-        line_appender(folder / "lines.jsonl") as append,
         (folder / "flushed.jsonl").open("wb", buffering=0) as flushed,
     ):
 
@@ -50,9 +48,6 @@ def measure(folder: Path) -> dict[str, list[float]]:
             ledger.begin(epoch, 0, RECORDS)
             seconds["ledger"].append(seconds_each(RECORDS, lambda step, epoch=epoch: ledger.record(epoch, step, REFS)))
             seconds["write"].append(seconds_each(RECORDS, lambda _: bare.write(data)))
-            seconds["json"].append(
-                seconds_each(RECORDS, lambda step: append({"epoch": 0, "step": step, "refs": REFS.tolist()}))
-            )
             seconds["flushed"].append(seconds_each(FLUSHED, write_flushed))
             seconds["copy"].append(seconds_each(FLUSHED, lambda _: np.copyto(target, source)))
     return seconds
@@ -62,7 +57,6 @@ def page(seconds: dict[str, list[float]], setup: dict[str, object]) -> list[str]
     names = {
         "ledger": "a record of the ledger",
         "write": "its bytes alone, one write to the system",
-        "json": "a JSON line, one write to the system",
         "flushed": "a JSON line, flushed to disk",
         "copy": f"copy of {STEP_BYTES / 1e6:.0f} MB in memory",
     }

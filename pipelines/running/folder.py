@@ -1,23 +1,29 @@
-"""A stage's output folder: stage.json, ledger.jsonl, quarantine.jsonl and the outputs, for one writer at a time."""
+"""A stage's output folder: stage.json, ledger.jsonl, quarantine.jsonl and the outputs, for one writer at a time.
+
+The ledger is a journal (`wsm_data.files.journal`): a run writes a file of its own, and the first file holds it all again
+once the stage has come to its end.
+"""
 
 import errno
 import fcntl
 import json
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any, TextIO
 
 from pipelines.running.stage import Outcome
 from wsm_data.errors import ConfigError, IntegrityError, Reason
 from wsm_data.files.atomic import write_text
-from wsm_data.files.jsonlines import drop_torn_line, line_appender, read_lines, write_lines
+from wsm_data.files.journal import JournalWriter, journal_files, read_journal, rewrite_journal
+from wsm_data.files.jsonlines import canonical_json, read_lines, write_lines
 from wsm_data.schema.verdict import Refusal
 
-STAGE_FILE, LEDGER_FILE = "stage.json", "ledger.jsonl"
+STAGE_FILE, LEDGER = "stage.json", "ledger"
 QUARANTINE_FILE, PENDING_FILE = "quarantine.jsonl", "pending.jsonl"
+_SYNC_EVERY_S = 0.2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,8 +97,12 @@ def write_stage_record(folder: Path, record: StageRecord) -> None:
 
 
 def read_ledger(folder: Path, *, with_stale: bool = False) -> dict[str, LedgerEntry]:
-    """The last entry of every unit; stale ones, which are no part of the stage's result, only if they are asked for."""
-    entries = {str(line["unit"]): _entry_from_line(line) for line in read_lines(folder / LEDGER_FILE)}
+    """The last entry of every unit; stale ones, which are no part of the stage's result, only if they are asked for.
+
+    Raises:
+        IntegrityError: a line is damaged, or names an output that does not lie in the folder.
+    """
+    entries = {str(line["unit"]): _entry_from_line(folder, line) for line in read_journal(folder, LEDGER)}
     return {unit: entry for unit, entry in entries.items() if with_stale or not entry.stale}
 
 
@@ -113,12 +123,13 @@ def ledger_appender(folder: Path) -> Iterator[Callable[[LedgerEntry], LedgerEntr
     That function returns the entry as a later run reads it (a tuple among the facts is a list by then), so that what
     follows cannot depend on whether the run was cut short.
     """
-    with line_appender(folder / LEDGER_FILE) as append_line:
+    with JournalWriter(folder, LEDGER, _SYNC_EVERY_S) as journal:
 
         def append(entry: LedgerEntry) -> LedgerEntry:
             sizes = [size_on_disk(folder / output) for output in entry.outcome.outputs]
             line = {**_ledger_line(entry), "sizes": sizes, "time": round(time.time(), 3)}
-            return _entry_from_line(append_line(line))
+            journal.append(line)
+            return _entry_from_line(folder, json.loads(canonical_json(line)))
 
         yield append
 
@@ -126,9 +137,12 @@ def ledger_appender(folder: Path) -> Iterator[Callable[[LedgerEntry], LedgerEntr
 def compact_ledger(folder: Path, settled: Mapping[str, LedgerEntry], stale: Mapping[str, LedgerEntry]) -> None:
     """Keep only the given entries, mark the stale ones, and delete the files that only others wrote.
 
-    Lines keep their text, times included; a ledger in which nothing changes is left alone.
+    Lines keep their text, times included; a ledger of one file in which nothing changes is left alone.
+
+    Raises:
+        IntegrityError: a line is damaged, or names an output that does not lie in the folder.
     """
-    lines = list(read_lines(folder / LEDGER_FILE))
+    lines = list(read_journal(folder, LEDGER))
     kept = []
     for unit, line in {str(line["unit"]): line for line in lines}.items():
         plain = {name: value for name, value in line.items() if name != "stale"}
@@ -136,18 +150,26 @@ def compact_ledger(folder: Path, settled: Mapping[str, LedgerEntry], stale: Mapp
             kept.append(plain)
         elif unit in stale and stale[unit].key == line["key"]:
             kept.append({**plain, "stale": True})
-    if kept == lines:
+    if kept == lines and sum(name == LEDGER for name, _ in journal_files(folder)) <= 1:
         return
-    wanted = {output for line in kept for output in _outputs(line)}
-    for line in lines:
-        for output in _outputs(line):
-            if output not in wanted and (folder / output).is_file():
-                (folder / output).unlink()
-    write_lines(folder / LEDGER_FILE, kept)
+    wanted = {output for line in kept for output in _outputs(folder, line)}
+    for output in {output for line in lines for output in _outputs(folder, line)} - wanted:
+        if (folder / output).is_file():
+            (folder / output).unlink()
+    rewrite_journal(folder, LEDGER, kept)
 
 
-def _outputs(line: Mapping[str, Any]) -> Sequence[str]:
-    return tuple(line["outputs"])
+def _outputs(folder: Path, line: Mapping[str, Any]) -> tuple[str, ...]:
+    """Outputs of a line, which are looked for, and deleted, below the folder: they must not climb out of it."""
+    outputs = tuple(line["outputs"])
+    for output in outputs:
+        path = PurePosixPath(output)
+        if path.is_absolute() or ".." in path.parts or not path.parts:
+            raise IntegrityError(
+                f"{folder}: the ledger must name outputs of unit {line['unit']} inside the folder, found {output!r}; "
+                "restore the ledger, or delete the folder and run the stage again"
+            )
+    return outputs
 
 
 def _ledger_line(entry: LedgerEntry) -> dict[str, Any]:
@@ -205,7 +227,6 @@ def locked(folder: Path) -> Iterator[None]:
             raise ConfigError(
                 f"{folder} is being written by another wsm process; wait for it, or use another --out"
             ) from error
-        drop_torn_line(folder / LEDGER_FILE)
         yield
 
 
@@ -219,12 +240,12 @@ def _lock_file(folder: Path) -> TextIO:
         raise ConfigError(f"{folder} must be a folder that can be written ({error}); use another --out") from error
 
 
-def _entry_from_line(line: Mapping[str, Any]) -> LedgerEntry:
+def _entry_from_line(folder: Path, line: Mapping[str, Any]) -> LedgerEntry:
     outcome = Outcome(
         unit=line["unit"],
         state=line["state"],
         digest=line["digest"],
-        outputs=tuple(line["outputs"]),
+        outputs=_outputs(folder, line),
         facts=line["facts"],
         refusals=tuple(refusal_from_json(record) for record in line["refusals"]),
         seconds=line["seconds"],

@@ -79,8 +79,8 @@ def test_a_ledger_that_was_switched_on_in_mid_run_proves_what_followed(tmp_path,
 def test_bytes_of_a_record_that_was_cut_short_are_counted(resumed, tiny, capsys):
     audit(resumed, releases=[str(tiny.folder)])
     assert "cut short" not in capsys.readouterr().out
-    with (resumed / "rank-00001-000000.ledger").open("ab") as file:
-        file.write(b"STEP" + bytes([16]))
+    with (resumed / "rank-00001.jsonl").open("ab") as file:
+        file.write(b'{"clo')
     audit(resumed, releases=[str(tiny.folder)])
     assert "3 files, 0 of them not closed, 5 bytes of records that were cut short" in capsys.readouterr().out
 

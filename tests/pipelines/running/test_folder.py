@@ -22,6 +22,7 @@ from pipelines.running.folder import (
 )
 from pipelines.running.stage import Outcome, Unit, refused
 from wsm_data.errors import ConfigError, DataError, IntegrityError, Reason
+from wsm_data.files.journal import JournalWriter, read_records
 from wsm_data.files.jsonlines import read_lines
 
 RECORD = StageRecord(
@@ -35,6 +36,18 @@ RECORD = StageRecord(
     units=4,
     workers=2,
 )
+LINE = {
+    "unit": "a",
+    "key": "k",
+    "state": "done",
+    "digest": "",
+    "outputs": [],
+    "facts": {},
+    "refusals": [],
+    "seconds": 0.5,
+    "sizes": [],
+    "time": 7.5,
+}
 
 
 def entry(unit, key="k", **values):
@@ -100,8 +113,7 @@ def test_a_torn_last_line_is_as_if_it_had_not_been_written(tmp_path):
     ledger = tmp_path / "ledger.jsonl"
     ledger.write_bytes(ledger.read_bytes()[:-7])
     assert list(read_ledger(tmp_path)) == ["a"]
-    with locked(tmp_path):
-        add(tmp_path, entry("c"))
+    add(tmp_path, entry("c"))
     assert list(read_ledger(tmp_path)) == ["a", "c"]
 
 
@@ -127,6 +139,28 @@ def test_a_ledger_with_nothing_to_compact_is_left_alone(tmp_path):
     assert (tmp_path / "ledger.jsonl").stat().st_ino == before
 
 
+def test_compacting_makes_one_file_of_what_several_runs_added(tmp_path):
+    for unit in ("a", "b"):
+        add(tmp_path, entry(unit))
+    compact_ledger(tmp_path, {"a": entry("a"), "b": entry("b")}, {})
+    assert [path.name for path in tmp_path.iterdir()] == ["ledger.jsonl"]
+    assert list(read_ledger(tmp_path)) == ["a", "b"]
+
+
+@pytest.mark.parametrize("output", ["../kept", "x/../../kept", "/kept", "..", ".", ""])
+def test_an_output_outside_the_folder_is_refused_and_nothing_is_deleted(tmp_path, output):
+    out = tmp_path / "out"
+    (out / "x").mkdir(parents=True)
+    (tmp_path / "kept").touch()
+    name = str(tmp_path / "kept") if output == "/kept" else output
+    with JournalWriter(out, "ledger") as journal:
+        journal.append({**LINE, "outputs": [name]})
+    for read in (lambda: read_ledger(out), lambda: compact_ledger(out, {}, {})):
+        with pytest.raises(IntegrityError, match="must name outputs of unit a inside the folder"):
+            read()
+    assert (tmp_path / "kept").exists()
+
+
 def test_compacting_passes_over_files_that_are_gone_already(tmp_path):
     add(tmp_path, entry("a", outputs=("never written",)))
     compact_ledger(tmp_path, {}, {})
@@ -142,6 +176,15 @@ def test_a_stale_line_keeps_its_files_and_is_read_only_by_who_asks_for_it(tmp_pa
     assert (stale.stale, stale.sizes, (tmp_path / "kept").exists()) == (True, (4,), True)
     compact_ledger(tmp_path, {"a": entry("a"), "b": entry("b")}, {})
     assert not read_ledger(tmp_path)["a"].stale
+
+
+def test_a_ledger_from_before_checksums_is_read_and_goes_on(tmp_path):
+    old = {name: value for name, value in LINE.items() if name != "sizes"}
+    (tmp_path / "ledger.jsonl").write_text(json.dumps(old) + "\n" + json.dumps({**old, "unit": "b"}) + "\n")
+    add(tmp_path, entry("b", "new"), entry("c"))
+    assert {unit: one.key for unit, one in read_ledger(tmp_path).items()} == {"a": "k", "b": "new", "c": "k"}
+    compact_ledger(tmp_path, read_ledger(tmp_path), {})
+    assert [line["unit"] for line in read_records(tmp_path / "ledger.jsonl")] == ["a", "b", "c"]
 
 
 # the quarantine

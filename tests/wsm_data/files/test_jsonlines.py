@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wsm_data.errors import IntegrityError
-from wsm_data.files.jsonlines import canonical_json, drop_torn_line, line_appender, read_lines, write_lines
+from wsm_data.files.jsonlines import canonical_json, line_appender, read_lines, write_lines
 
 SCALARS = st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text()
 JSON_VALUES = st.recursive(
@@ -63,12 +63,6 @@ def test_appended_lines_are_read_in_order(tmp_path):
     assert list(read_lines(path)) == [{"n": 0}, {"n": 1}, {"n": 2}]
 
 
-def test_an_append_returns_the_record_as_it_will_be_read(tmp_path):
-    with line_appender(tmp_path / "a.jsonl") as append:
-        returned = append({"words": ("a", "b"), "n": 1.0})
-    assert [returned] == list(read_lines(tmp_path / "a.jsonl")) == [{"words": ["a", "b"], "n": 1.0}]
-
-
 def test_an_appended_line_survives_the_death_of_its_writer(tmp_path):
     path = tmp_path / "a.jsonl"
     program = (
@@ -77,18 +71,6 @@ def test_an_appended_line_survives_the_death_of_its_writer(tmp_path):
     )
     assert subprocess.run([sys.executable, "-c", program, str(path)]).returncode == -9
     assert list(read_lines(path)) == [{"n": 1}]
-
-
-def test_appended_lines_are_brought_to_disk_now_and_then_and_at_the_end(tmp_path, monkeypatch):
-    times = iter([0.0, 0.1, 0.15, 0.25, 0.25, 0.3])  # opening, two lines, a late line asks twice, one more line
-    monkeypatch.setattr("time.monotonic", lambda: next(times))
-    synced = []
-    monkeypatch.setattr(os, "fsync", lambda _: synced.append(path.read_bytes().count(b"\n")))
-    path = tmp_path / "a.jsonl"
-    with line_appender(path) as append:
-        for number in range(4):
-            append({"n": number})
-    assert synced == [3, 4]
 
 
 @given(records=st.lists(st.dictionaries(st.text(), JSON_VALUES, max_size=3), max_size=5))
@@ -123,23 +105,7 @@ def test_a_torn_last_line_is_passed_over_wherever_it_was_cut(tmp_path, torn_at):
     assert list(read_lines(path)) == [{"n": 1}]
 
 
-@pytest.mark.parametrize("content", [b"", b'{"n":1}\n', b'{"n":1}\n{"n"', b'{"n"'])
-def test_after_the_torn_line_is_dropped_an_append_stands_alone(tmp_path, content):
-    path = tmp_path / "a.jsonl"
-    path.write_bytes(content)
-    whole = list(read_lines(path))
-    drop_torn_line(path)
-    with line_appender(path) as append:
-        append({"n": 9})
-    assert list(read_lines(path)) == [*whole, {"n": 9}]
-
-
-def test_dropping_the_torn_line_of_a_file_that_does_not_exist_makes_none(tmp_path):
-    drop_torn_line(tmp_path / "absent.jsonl")
-    assert not (tmp_path / "absent.jsonl").exists()
-
-
-def test_an_append_after_a_torn_line_that_was_not_dropped_is_noticed(tmp_path):
+def test_an_append_after_a_torn_line_is_noticed(tmp_path):
     path = tmp_path / "a.jsonl"
     path.write_bytes(b'{"n":1}\n{"n":')
     with line_appender(path) as append:

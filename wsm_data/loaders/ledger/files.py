@@ -1,36 +1,24 @@
-"""The files of a ledger: one a rank and process, each a sequence of frames.
+"""The files of a ledger: journals (`wsm_data.files.journal`), one a rank, with a file for each of its processes.
 
-A frame is a tag of four letters, the size of the payload (uint32), the payload, and the xxh3_64 of all that (uint64),
-little-endian. `SESS` comes first: JSON of who writes. `STRT` says that steps follow from (epoch, step) on, and how many
-the epoch has; `STEP` says which clips one step brought; `DONE` that the writer was closed. What a killed writer leaves
-behind the last whole frame is recognised and passed over; any other damage is refused. A frame whose size was changed
-so that it reaches past the end looks like one that was cut short: it is refused where a whole frame follows, and the
-last frame of a file alone can be lost in this way, which counts as torn.
+The first record of a file says who writes: the session, its rank, and what decides the order of the run. Then a record
+with `start` says that steps follow from (epoch, start) on, and how many the epoch has; one with `refs` which clips a
+step brought; `closed` that the writer was closed.
 """
 
-import json
 import re
-import struct
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import xxhash
 from numpy.typing import NDArray
 
 from wsm_data.errors import IntegrityError
+from wsm_data.files.journal import file_name, journal_files, read_records, torn_bytes
 
-LEDGER_VERSION = 1
-SESSION, START, STEP, DONE = b"SESS", b"STRT", b"STEP", b"DONE"
-HEAD = struct.Struct("<4sI")
-CHECKSUM = struct.Struct("<Q")
-START_FIELDS = struct.Struct("<qqq")
-STEP_FIELDS = struct.Struct("<qq")
-_MAX_PAYLOAD_BYTES = 1 << 28  # a size beyond it is damage, not a frame that was cut
-_TAG = re.compile(b"(?=SESS|STRT|STEP|DONE)")
-_FILE_NAME = re.compile(r"rank-([0-9]{5,})-([0-9]{6,})\.ledger")
+LEDGER_VERSION = 2
+_RANK = re.compile(r"rank-([0-9]{5,})")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -67,7 +55,7 @@ class LedgerFile:
         world_size: number of ranks.
         segments: in the order in which they were recorded.
         closed: whether the writer was closed; otherwise it was killed, or still writes.
-        torn_bytes: bytes behind the last whole frame: of one that was not written to its end.
+        torn_bytes: bytes behind the last whole record: of one that was not written to its end.
     """
 
     path: Path
@@ -80,22 +68,30 @@ class LedgerFile:
     torn_bytes: int
 
 
-def framed(tag: bytes, payload: bytes) -> bytes:
-    """A frame: tag, size, payload, checksum."""
-    data = HEAD.pack(tag, len(payload)) + payload
-    return data + CHECKSUM.pack(xxhash.xxh3_64_intdigest(data))
+def journal_name(rank: int) -> str:
+    """Name of the journal of a rank."""
+    return f"rank-{rank:05d}"
 
 
-def file_name(rank: int, number: int) -> str:
+def ledger_file_name(rank: int, number: int) -> str:
     """Name of the file that is number `number` of a rank's."""
-    return f"rank-{rank:05d}-{number:06d}.ledger"
+    return file_name(journal_name(rank), number)
 
 
 def ledger_files(folder: Path) -> dict[tuple[int, int], Path]:
-    """The files of a ledger by (rank, number), in that order: the processes of a rank by number, without a clock."""
-    paths = list(folder.iterdir()) if folder.is_dir() else []
-    named = [(match, path) for path in paths if (match := _FILE_NAME.fullmatch(path.name))]
-    return dict(sorted(((int(match[1]), int(match[2])), path) for match, path in named))
+    """The files of a ledger by (rank, number), in that order: the processes of a rank by number, without a clock.
+
+    Raises:
+        IntegrityError: the ledger is of an older version.
+    """
+    if old := next(folder.glob("rank-*.ledger"), None):
+        raise IntegrityError(
+            f"{old} is of an older version of the ledger, {LEDGER_VERSION} is needed; use the wsm that wrote it, or "
+            "give the run another folder for its ledger"
+        )
+    files = journal_files(folder).items()
+    named = [(match, number, path) for (name, number), path in files if (match := _RANK.fullmatch(name))]
+    return dict(sorted(((int(match[1]), number), path) for match, number, path in named))
 
 
 def read_session(path: Path) -> dict[str, Any] | None:
@@ -104,11 +100,13 @@ def read_session(path: Path) -> dict[str, Any] | None:
     Raises:
         IntegrityError: it is damaged, or of another version.
     """
-    with path.open("rb") as file:
-        data = file.read(HEAD.size)
-        if len(data) == HEAD.size:
-            data += file.read(min(HEAD.unpack(data)[1], _MAX_PAYLOAD_BYTES) + CHECKSUM.size)
-    return _session(memoryview(data), path)
+    session = next(read_records(path), None)
+    if session is not None and session.get("version") != LEDGER_VERSION:
+        raise IntegrityError(
+            f"{path} must start with the head of a ledger of version {LEDGER_VERSION}, found "
+            f"{session.get('version', 'none')}; restore the file or use a matching wsm"
+        )
+    return session
 
 
 def read_ledger_file(path: Path) -> LedgerFile | None:
@@ -117,90 +115,40 @@ def read_ledger_file(path: Path) -> LedgerFile | None:
     Raises:
         IntegrityError: it is damaged other than by a kill, or of another version.
     """
-    data = memoryview(path.read_bytes())
-    session = _session(data, path)
+    session = read_session(path)
     if session is None:
         return None
-    segments: list[tuple[tuple[int, int, int], list[NDArray[np.int64]]]] = []
-    tag, place = SESSION, 0
-    while (frame := _frame_at(data, place, path)) is not None:
-        tag, payload = frame
-        if tag == START:
-            segments.append((START_FIELDS.unpack(payload), []))
-        elif tag == STEP:
-            _add_step(segments, payload, path, place)
-        place += HEAD.size + len(payload) + CHECKSUM.size
+    _, *records = read_records(path)
     return LedgerFile(
         path=path,
         session=session["session"],
         identity=session["identity"],
         rank=session["rank"],
         world_size=session["world_size"],
-        segments=tuple(
-            Segment(epoch=epoch, start=start, steps=steps, refs=tuple(refs)) for (epoch, start, steps), refs in segments
-        ),
-        closed=tag == DONE,
-        torn_bytes=len(data) - place,
+        segments=_segments(records, path),
+        closed=bool(records) and "closed" in records[-1],
+        torn_bytes=torn_bytes(path),
     )
 
 
-def _add_step(
-    segments: list[tuple[tuple[int, int, int], list[NDArray[np.int64]]]], payload: memoryview, path: Path, place: int
-) -> None:
-    epoch, step = STEP_FIELDS.unpack(payload[: STEP_FIELDS.size])
-    (begun, start, steps), refs = segments[-1] if segments else ((-1, 0, 0), [])
-    if (epoch, step) != (begun, start + len(refs)) or step >= steps:
-        raise IntegrityError(
-            f"{path}: at byte {place} step {start + len(refs)} of epoch {begun} must follow, found step {step} of "
-            f"epoch {epoch}; restore the file"
-        )
-    refs.append(np.frombuffer(payload[STEP_FIELDS.size :], "<i8"))
-
-
-def _session(data: memoryview, path: Path) -> dict[str, Any] | None:
-    frame = _frame_at(data, 0, path)
-    if frame is None:
-        return None
-    tag, payload = frame
-    session = json.loads(bytes(payload)) if tag == SESSION else {}
-    if session.get("version") != LEDGER_VERSION:
-        raise IntegrityError(
-            f"{path} must start with the head of a ledger of version {LEDGER_VERSION}, found "
-            f"{session.get('version', 'none')}; restore the file or use a matching wsm"
-        )
-    return dict(session)
-
-
-def _frame_at(data: memoryview, place: int, path: Path) -> tuple[bytes, memoryview] | None:
-    """Tag and payload of the frame at a byte; None at the end, also where only a part of a frame follows.
-
-    Zeros count as not written: a file system leaves them for blocks it had not written when power failed.
-    """
-    rest = data[place:]
-    if (frame := _whole_frame(rest)) is not None:
-        return frame
-    is_cut = len(bytes(rest).rstrip(b"\0")) < _stated_bytes(rest)
-    if is_cut and not any(_whole_frame(rest[match.start() :]) for match in _TAG.finditer(rest, 1)):
-        return None
-    raise IntegrityError(
-        f"{path}: the record at byte {place} must have the size and the checksum it was written with, found other "
-        "bytes; restore the file"
+def _segments(records: Iterable[Mapping[str, Any]], path: Path) -> tuple[Segment, ...]:
+    segments: list[tuple[Mapping[str, Any], list[NDArray[np.int64]]]] = []
+    for record in records:
+        if "start" in record:
+            segments.append((record, []))
+        elif "refs" in record:
+            begun, refs = segments[-1] if segments else ({"epoch": -1, "start": 0, "steps": 0}, [])
+            _require_next(record, begun, begun["start"] + len(refs), path)
+            refs.append(np.array(record["refs"], np.int64))
+    return tuple(
+        Segment(epoch=begun["epoch"], start=begun["start"], steps=begun["steps"], refs=tuple(refs))
+        for begun, refs in segments
     )
 
 
-def _stated_bytes(data: memoryview) -> int:
-    """Bytes of a whole frame that begins as `data` does; of one without payload where its head cannot be believed."""
-    tag, size = HEAD.unpack(data[: HEAD.size]) if len(data) >= HEAD.size else (b"", 0)
-    if tag not in (SESSION, START, STEP, DONE) or size > _MAX_PAYLOAD_BYTES:
-        size = 0
-    return HEAD.size + int(size) + CHECKSUM.size
-
-
-def _whole_frame(data: memoryview) -> tuple[bytes, memoryview] | None:
-    """Tag and payload of the frame that `data` begins with; None where there is none with the right checksum."""
-    end = _stated_bytes(data) - CHECKSUM.size
-    if len(data) < end + CHECKSUM.size:
-        return None
-    if CHECKSUM.unpack(data[end : end + CHECKSUM.size])[0] != xxhash.xxh3_64_intdigest(data[:end]):
-        return None
-    return bytes(data[:4]), data[HEAD.size : end]
+def _require_next(record: Mapping[str, Any], begun: Mapping[str, Any], step: int, path: Path) -> None:
+    if (record["epoch"], record["step"]) != (begun["epoch"], step) or step >= begun["steps"]:
+        raise IntegrityError(
+            f"{path}: step {step} of epoch {begun['epoch']} must follow, found step {record['step']} of epoch "
+            f"{record['epoch']}; restore the file"
+        )

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wsm_data.errors import ConfigError, IntegrityError
-from wsm_data.loaders.ledger.files import LedgerFile, Segment, file_name, ledger_files, read_ledger_file
+from wsm_data.loaders.ledger.files import LedgerFile, Segment, ledger_file_name, ledger_files, read_ledger_file
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -161,7 +161,7 @@ def _missing_files(folder: Path) -> Iterator[str]:
     present = ledger_files(folder)
     for rank, number in present:
         if number and (rank, number - 1) not in present:
-            name, earlier = file_name(rank, number), file_name(rank, number - 1)
+            name, earlier = ledger_file_name(rank, number), ledger_file_name(rank, number - 1)
             yield f"{earlier} must be in the ledger, as {name} is, but it is not there; restore the file"
 
 

@@ -1,43 +1,24 @@
 """The ledger of a training run: every step that a rank delivers is recorded, for `wsm audit-run`.
 
 A record is one write to the operating system and is not flushed to disk by itself: it survives the death of the
-process, and a power cut costs what the system had not written yet. The form of the files is that of `ledger_files`.
+process, and a power cut costs what the system had not written yet. The form of the files is that of `files.py`.
 """
 
-import errno
-import io
 import json
-import os
 import secrets
-import struct
 from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
 import numpy as np
-import xxhash
 from numpy.typing import NDArray
 
 from wsm_data.errors import ConfigError
+from wsm_data.files.journal import JournalWriter
 from wsm_data.files.jsonlines import canonical_json
-from wsm_data.loaders.ledger.files import (
-    CHECKSUM,
-    DONE,
-    LEDGER_VERSION,
-    SESSION,
-    START,
-    START_FIELDS,
-    STEP,
-    STEP_FIELDS,
-    file_name,
-    framed,
-    ledger_files,
-    read_session,
-)
+from wsm_data.loaders.ledger.files import LEDGER_VERSION, journal_name, ledger_files, read_session
 from wsm_data.loaders.sources.state import difference_lines
-
-_STEP_HEAD = struct.Struct("<4sIqq")  # head of a frame and fields of a step in one: this is packed for every step
 
 
 class LedgerWriter:
@@ -66,7 +47,7 @@ class LedgerWriter:
             "rank": rank,
             "world_size": world_size,
         }
-        self._file: io.FileIO | None = None
+        self._journal: JournalWriter | None = None
         self._epoch, self._next_step, self._steps = -1, 0, 0
         _require_identity(self._folder, self._session["identity"])
 
@@ -82,10 +63,10 @@ class LedgerWriter:
         """
         if epoch < 0 or not 0 <= step <= steps:
             raise ValueError(f"a start must be a step of 0 to {steps} in an epoch of 0 on, found epoch {epoch}, {step}")
-        if self._file is None:
-            self._file = _create(self._folder, self._rank)
-            _write(self._file, framed(SESSION, canonical_json(self._session).encode()))
-        _write(self._file, framed(START, START_FIELDS.pack(epoch, step, steps)))
+        if self._journal is None:
+            self._journal = JournalWriter(self._folder, journal_name(self._rank))
+            self._journal.append(self._session)
+        self._journal.append({"epoch": epoch, "start": step, "steps": steps})
         self._epoch, self._next_step, self._steps = epoch, step, steps
 
     def record(self, epoch: int, step: int, refs: NDArray[np.int64]) -> None:
@@ -100,23 +81,19 @@ class LedgerWriter:
             ValueError: it is not the next step, or the epoch was not begun.
             OSError: the record could not be written.
         """
-        if self._file is None or epoch != self._epoch or step != self._next_step or step >= self._steps:
+        if self._journal is None or epoch != self._epoch or step != self._next_step or step >= self._steps:
             raise ValueError(
                 f"the next step must be {self._next_step} of {self._steps} in epoch {self._epoch}, found step {step} "
                 f"of epoch {epoch}; begin() says where delivery goes on"
             )
-        content = np.ascontiguousarray(refs, "<i8").tobytes()
-        data = _STEP_HEAD.pack(STEP, STEP_FIELDS.size + len(content), epoch, step) + content
-        _write(self._file, data + CHECKSUM.pack(xxhash.xxh3_64_intdigest(data)))
+        self._journal.append({"epoch": epoch, "step": step, "refs": np.asarray(refs, np.int64).tolist()})
         self._next_step = step + 1
 
     def close(self) -> None:
         """Say that the process stopped of its own will, and flush the file to disk. A later `begin` opens another."""
-        file, self._file = self._file, None
-        if file is not None:
-            with file:
-                _write(file, framed(DONE, b""))
-                os.fsync(file.fileno())
+        journal, self._journal = self._journal, None
+        if journal is not None:
+            journal.close({"closed": True})
 
     def __enter__(self) -> "LedgerWriter":
         return self
@@ -137,15 +114,3 @@ def _require_identity(folder: Path, identity: Mapping[str, Any]) -> None:
             f"the ledger {folder} is that of a run over other sources or in another order\n{lines}\n"
             "Give each run a ledger of its own"
         )
-
-
-def _create(folder: Path, rank: int) -> io.FileIO:
-    """A new file of this rank, numbered after those it has."""
-    folder.mkdir(parents=True, exist_ok=True)
-    number = 1 + max((number for owner, number in ledger_files(folder) if owner == rank), default=-1)
-    return (folder / file_name(rank, number)).open("xb", buffering=0)
-
-
-def _write(file: io.FileIO, data: bytes) -> None:
-    if file.write(data) != len(data):
-        raise OSError(errno.ENOSPC, "a record of the ledger was cut short; is the disk full?", file.name)

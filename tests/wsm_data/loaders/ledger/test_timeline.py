@@ -4,6 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wsm_data.errors import ConfigError, IntegrityError
+from wsm_data.loaders.ledger.files import ledger_file_name
 from wsm_data.loaders.ledger.timeline import read_timeline, steps_text
 from wsm_data.loaders.ledger.writer import LedgerWriter
 
@@ -26,7 +27,7 @@ def run_rank(folder, rank, world_size, start, end, steps=STEPS):
         for number in range(step, min(steps, end[1]) if epoch == end[0] else steps):
             writer.record(epoch, number, refs_of(epoch, number, rank, world_size))
         epoch, step = epoch + 1, 0
-    writer._file.close()  # nothing is said at the end: as if killed
+    writer._journal.close()  # nothing is said at the end: as if killed
     writer._file = None
 
 
@@ -113,7 +114,7 @@ def test_a_session_that_was_killed_before_it_recorded_changes_nothing(tmp_path):
 
 def test_a_rank_that_was_killed_before_its_head_was_whole_is_passed_over(tmp_path):
     run_session(tmp_path, 1, (0, 0), (0, 6))
-    (tmp_path / "rank-00000-000001.ledger").write_bytes(b"SESS")
+    (tmp_path / "rank-00000.000001.jsonl").write_bytes(b'{"identity"')
     assert len(read_timeline(tmp_path).files) == 1
 
 
@@ -147,10 +148,9 @@ def test_a_ledger_may_begin_in_mid_run(tmp_path, start):
 def test_a_file_that_was_taken_away_is_missed(tmp_path, rank, number):
     for start in (0, 2, 4):
         run_session(tmp_path, 2, (0, start), (0, start + 2))
-    (tmp_path / f"rank-{rank:05d}-{number:06d}.ledger").unlink()
-    message = (
-        f"rank-{rank:05d}-{number:06d}.ledger must be in the ledger, as rank-{rank:05d}-{number + 1:06d}.ledger is"
-    )
+    name, following = (ledger_file_name(rank, one) for one in (number, number + 1))
+    (tmp_path / name).unlink()
+    message = f"{name} must be in the ledger, as {following} is"
     assert [misfit for misfit in read_timeline(tmp_path).misfits if message in misfit]
 
 
@@ -179,7 +179,7 @@ def test_files_of_two_runs_in_one_folder_are_refused(tmp_path):
     for number in (1, 2):
         with LedgerWriter(tmp_path / str(number), {"run": number}, 0, 1) as writer:
             writer.begin(0, 0, 1)
-    (tmp_path / "1" / "rank-00000-000000.ledger").rename(tmp_path / "2" / "rank-00000-000001.ledger")
+    (tmp_path / "1" / "rank-00000.jsonl").rename(tmp_path / "2" / "rank-00000.000001.jsonl")
     with pytest.raises(IntegrityError, match="are of different runs"):
         read_timeline(tmp_path / "2")
 
