@@ -1,7 +1,7 @@
 """A stage's output folder: stage.json, ledger.jsonl, quarantine.jsonl and the outputs, for one writer at a time.
 
-The ledger is a journal (`wsm_data.files.journal`): a run writes a file of its own, and the first file holds it all again
-once the stage has come to its end.
+The ledger is a journal (`wsm_data.files.journal`): a run writes a file of its own, and the first file holds it all
+again once the stage has come to its end.
 """
 
 import errno
