@@ -9,6 +9,7 @@ from wsm_data.errors import IntegrityError
 from wsm_data.files.digest import digest_json, sha256_bytes
 from wsm_data.schema.codec import CodecInfo
 from wsm_data.schema.depth import DepthRange
+from wsm_data.shards.names import is_shard_name
 from wsm_data.shards.statistics import LatentStatistics
 
 RELEASE_SCHEMA_VERSION = 1
@@ -31,6 +32,10 @@ class ShardInfo:
     clips: int
     bytes: int
     sha256: str
+
+    def __post_init__(self) -> None:
+        if not is_shard_name(self.name):  # it becomes a path, of a release and of caches
+            raise ValueError(f"a shard must have a name such as train-000000.tar, found {self.name!r}")
 
 
 @dataclass(frozen=True, kw_only=True)

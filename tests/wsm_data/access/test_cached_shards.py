@@ -138,15 +138,13 @@ def test_faults_that_pass_change_nothing(open_reader, published, remote, faults)
 
 
 def test_a_shard_that_cannot_be_fetched_in_advance_is_named_once(
-    open_reader, published, remote, address, monkeypatch, caplog
+    open_reader, published, remote, address, tmp_path, caplog
 ):
-    monkeypatch.setattr("wsm_data.access.cached_shards._RETRY_S", 0.01)
-    monkeypatch.setattr("wsm_data.access.cached_shards._IDLE_S", 0.01)
     bad = shards_of(published)[0]
     remote.proxy.spoil(bad, Fault.RESET, FOREVER)
     reader = open_reader(attempts=1)
     reader.expect(first_spans(published))
-    wait_for(lambda: len(remote.proxy.requests(bad)) >= 3)
+    wait_for(lambda: shards_of(published)[1] in cached(tmp_path))
     reader.close()
     said = [record.getMessage() for record in caplog.records if "in advance" in record.getMessage()]
     assert [message.partition(" ")[0] for message in said] == [f"{address}/{bad}"]
@@ -201,12 +199,11 @@ def test_a_forgotten_shard_is_downloaded_again(open_reader, published, remote, t
     assert read_clip(reader, span) == published.bytes_of(span)
 
 
-def test_a_cache_that_is_too_small_says_so_once_and_works(open_reader, published, caplog):
+def test_a_cache_of_one_shard_works(open_reader, published):
     reader = open_reader(cache_gib=max(shard.bytes for shard in published.manifest.shards) / GIB)
     for _ in range(4):
         for span in first_spans(published):
             assert read_clip(reader, span) == published.bytes_of(span)
-    assert caplog.text.count("Raise cache_gib") == 1
 
 
 def test_a_cache_that_cannot_hold_a_shard_is_refused(open_reader, published):
@@ -234,7 +231,7 @@ def test_closing_gives_up_what_hangs_and_ends_the_threads(open_reader, published
 
     waiting = threading.Thread(target=read)
     waiting.start()
-    wait_for(lambda: remote.proxy.spoiled() >= 2)
+    wait_for(lambda: remote.proxy.spoiled() >= 1)
     reader.close()
     reader.close()
     waiting.join(timeout=30)

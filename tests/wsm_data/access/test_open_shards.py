@@ -8,6 +8,7 @@ from typer.testing import CliRunner
 
 from pipelines.cli import app
 from wsm_data.access.cached_shards import CachedShards
+from wsm_data.access.clip_reader import MAX_READS
 from wsm_data.access.config import AccessConfig, RemoteAccess
 from wsm_data.access.local_shards import LocalShards
 from wsm_data.access.open_shards import open_shards
@@ -21,7 +22,8 @@ TRANSIENT = (Fault.SLOW_DOWN, Fault.RESET, Fault.CUT_BODY, Fault.SHORT_BODY)
 
 @pytest.mark.parametrize("access", list(RemoteAccess))
 def test_a_folder_is_read_where_it_lies(published, access):
-    reader = open_shards(open_release(published.folder), AccessConfig(access=access))
+    release = open_release(published.folder)
+    reader = open_shards(release.store, release.manifest, AccessConfig(access=access))
     reader.close()
     assert type(reader) is LocalShards
 
@@ -29,7 +31,8 @@ def test_a_folder_is_read_where_it_lies(published, access):
 def test_ranges_are_read_unless_the_settings_ask_for_whole_shards(remote, tmp_path):
     release = open_release(remote.url)
     for access, kind in ((RemoteAccess.RANGES, RangeReader), (RemoteAccess.SHARDS, CachedShards)):
-        reader = open_shards(release, remote.read(access=access, cache_dir=str(tmp_path)))
+        config = remote.read(access=access, cache_dir=str(tmp_path))
+        reader = open_shards(release.store, release.manifest, config)
         reader.close()
         assert type(reader) is kind
 
@@ -39,6 +42,17 @@ def test_a_release_behind_a_url_has_the_clips_of_the_folder(remote, published):
     assert far.manifest == local.manifest
     key = local.index.texts("key")[7]
     assert far.read_clip(key).rgb_latent.tobytes() == local.read_clip(key).rgb_latent.tobytes()
+
+
+def test_a_clip_that_was_damaged_on_the_way_is_read_again_and_named_where_it_stays_damaged(remote, published):
+    local, far = open_release(published.folder), open_release(remote.url)
+    row = local.index.row_at(7)
+    remote.proxy.spoil(row.shard, Fault.WRONG_BYTES)
+    assert far.read_clip_bytes(row.key) == local.read_clip_bytes(row.key)
+    assert remote.proxy.spoiled() == 1
+    remote.proxy.spoil(row.shard, Fault.WRONG_BYTES, MAX_READS)
+    with pytest.raises(IntegrityError, match=rf"{row.shard}, clip {row.key}: the .* of \w+\.\w+"):
+        far.read_row(row)
 
 
 def test_opening_gets_over_faults_that_pass(remote, published):

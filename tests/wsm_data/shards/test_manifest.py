@@ -65,5 +65,16 @@ def test_a_manifest_changed_in_any_way_is_refused(tiny: SimpleNamespace, change:
         parse_manifest(change(manifest_bytes(tiny.manifest)), "there")
 
 
+@pytest.mark.parametrize("name", ["../train-000000.tar", "/etc/train-000000.tar", "a/train-000000.tar", "x.tar", "", 7])
+def test_a_name_that_is_none_of_a_shard_is_refused_before_it_becomes_a_path(tiny: SimpleNamespace, name: Any) -> None:
+    record = json.loads(manifest_bytes(tiny.manifest))
+    record["shards"][0]["name"] = name
+    with pytest.raises(IntegrityError, match="there must be the manifest of a release"):
+        parse_manifest(json.dumps(record).encode(), "there")
+    if isinstance(name, str):
+        with pytest.raises(ValueError, match=r"a shard must have a name such as train-000000\.tar, found '"):
+            replace(tiny.manifest.shards[0], name=name)
+
+
 def test_the_documentation_lists_every_key(words_of_table: Callable[[str], list[str]], tiny: SimpleNamespace) -> None:
     assert sorted(words_of_table("## dataset.json")) == sorted(json.loads(manifest_bytes(tiny.manifest)))
