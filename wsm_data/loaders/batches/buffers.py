@@ -21,11 +21,14 @@ _HUGE_PAGE_BYTES = 2 << 20
 _ROUNDING_SHARE = 8
 """Sizes are rounded up to a multiple of an eighth of themselves, so that slightly longer batches find their memory."""
 
-_PATIENCE_S = 2e-3
+PATIENCE_S = 2e-3
 """Who trains lets go of the last batch some microseconds after the next one is delivered."""
 
 Memory = np.ndarray
 """A block of bytes; uint8 [size]."""
+
+Allocate = Callable[[int], Memory]
+"""Makes new memory of so many bytes, from the beginning of a page on."""
 
 
 class BufferPool:
@@ -34,20 +37,16 @@ class BufferPool:
     Memory comes back wherever the garbage collector happens to run, so nothing here waits for a lock then.
     """
 
-    def __init__(self, *, blocks: int, pinned: bool = False):
+    def __init__(self, *, blocks: int, allocate: Allocate, patience_s: float = PATIENCE_S):
         """Start without any memory.
 
         Args:
             blocks: blocks that are enough for who lets go of one batch when given the next. A further one is made only
                 when none comes back within a moment, for those who keep batches, and not kept when it comes back.
-            pinned: page-locked memory, from which a GPU copies while the processor does other things.
-
-        Raises:
-            ConfigError: page-locked memory needs a GPU, and there is none.
+            allocate: makes new memory (`allocator`).
+            patience_s: how long that moment is, s.
         """
-        if pinned and not torch.cuda.is_available():
-            raise ConfigError("pin_memory needs a CUDA device, and torch finds none; leave it out")
-        self._allocate: Callable[[int], Memory] = _pinned_memory if pinned else _page_memory
+        self._allocate, self._patience_s = allocate, patience_s
         self._free: deque[Memory] = deque()  # may be filled while this thread is about to take from it
         self._came_back = threading.Lock()  # released when memory comes back, acquired by who waits for some
         self._blocks: set[int] = set()  # by id
@@ -69,7 +68,7 @@ class BufferPool:
 
     def _reused(self, size_bytes: int) -> Memory:
         # Not a SimpleQueue: in CPython 3.11, `get(timeout=...)` in several threads may wait without end.
-        until_s = time.monotonic() + _PATIENCE_S
+        until_s = time.monotonic() + self._patience_s
         while True:
             try:
                 memory = self._free.popleft()
@@ -103,6 +102,20 @@ class BufferPool:
 def _rounded(size_bytes: int) -> int:
     step = max(_HUGE_PAGE_BYTES, 1 << max(0, size_bytes // _ROUNDING_SHARE).bit_length())
     return max(1, -(-size_bytes // step)) * step
+
+
+def allocator(*, pinned: bool) -> Allocate:
+    """What makes new memory.
+
+    Args:
+        pinned: page-locked, from which a GPU copies while the processor does other things.
+
+    Raises:
+        ConfigError: page-locked memory needs a GPU, and there is none.
+    """
+    if pinned and not torch.cuda.is_available():
+        raise ConfigError("pin_memory needs a CUDA device, and torch finds none; leave it out")
+    return _pinned_memory if pinned else _page_memory
 
 
 def _page_memory(size_bytes: int) -> Memory:

@@ -15,7 +15,7 @@ from wsm_data.access.open_shards import open_shards
 from wsm_data.access.shard_reader import ShardReader
 from wsm_data.errors import ConfigError
 from wsm_data.loaders.batches.batch import LATENT_DTYPES, LATENT_TENSORS, PackedBatch
-from wsm_data.loaders.batches.buffers import BufferPool
+from wsm_data.loaders.batches.buffers import BufferPool, allocator
 from wsm_data.loaders.batches.filling import ArrangedClip, arrange, batch_layout, describe, slots_of
 from wsm_data.loaders.batches.standardise import convert, standardisations
 from wsm_data.loaders.config import ReadConfig
@@ -62,7 +62,7 @@ class StepReader:
             _LOG.warning("latents of all sources are standardised by the statistics of the first, %s", manifest.name)
         self._converts = self._dtype is not _STORED or bool(self._standardise)
         self._verification = verification_of(sources.tables, read)
-        self._pool = BufferPool(blocks=max(read.prefetch_batches, 1) + 1, pinned=read.pin_memory)
+        self._pool = BufferPool(blocks=max(read.prefetch_batches, 1) + 1, allocate=allocator(pinned=read.pin_memory))
         self._staging = threading.local()
         self._readers = _open_readers(sources, read)
         self._looking_ahead = [item for item in dict.fromkeys(self._readers) if not isinstance(item, LocalShards)]

@@ -1,6 +1,7 @@
 import gc
 import sys
 import threading
+import weakref
 
 import numpy as np
 import pytest
@@ -9,14 +10,33 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wsm_data.errors import ConfigError
-from wsm_data.loaders.batches import buffers
-from wsm_data.loaders.batches.buffers import BufferPool
+from wsm_data.loaders.batches.buffers import BufferPool, allocator
 
 MIB = 1 << 20
 
 
+def page_pool(*, blocks: int, **settings) -> BufferPool:
+    return BufferPool(blocks=blocks, allocate=allocator(pinned=False), **settings)
+
+
+class Watched:
+    """Makes memory, and knows how much of it is still there."""
+
+    def __init__(self):
+        self._made = []
+
+    def __call__(self, size_bytes: int) -> np.ndarray:
+        memory = np.zeros(size_bytes, np.uint8)
+        self._made.append(weakref.ref(memory))
+        return memory
+
+    @property
+    def sizes(self) -> list[int]:
+        return [len(memory) for made in self._made if (memory := made()) is not None]
+
+
 def test_memory_is_used_again_when_nobody_looks_at_it():
-    pool = BufferPool(blocks=2)
+    pool = page_pool(blocks=2)
     places = set()
     for _ in range(5):
         block = pool.take(3 * MIB)
@@ -38,7 +58,7 @@ def test_memory_is_used_again_when_nobody_looks_at_it():
     ids=["slice", "other dtype", "array", "slice of an array", "memoryview", "strided"],
 )
 def test_memory_that_somebody_looks_at_is_not_used_again(look):
-    pool = BufferPool(blocks=4)
+    pool = page_pool(blocks=4)
     block = pool.take(MIB)
     block.fill_(7)
     view = look(block)
@@ -53,34 +73,33 @@ def test_memory_that_somebody_looks_at_is_not_used_again(look):
 
 
 def test_memory_starts_at_a_page_and_has_the_size_that_was_asked_for():
-    block = BufferPool(blocks=1).take(12345)
+    block = page_pool(blocks=1).take(12345)
     assert block.data_ptr() % 4096 == 0
     assert (block.shape, block.dtype) == ((12345,), torch.uint8)
 
 
 def test_memory_too_small_for_what_is_asked_is_let_go():
-    pool = BufferPool(blocks=3)
+    watched = Watched()
+    pool = BufferPool(blocks=3, allocate=watched)
     small = pool.take(MIB)
-    small.fill_(1)
     large = pool.take(40 * MIB)
-    large.fill_(2)
     del small, large
     assert pool.take(39 * MIB).numel() == 39 * MIB
-    assert len(pool._free) <= 1  # the small block is gone, the large one was lent again or lies there
+    assert [size >= 40 * MIB for size in watched.sizes] == [True]
 
 
 def test_no_more_is_kept_than_was_said():
-    pool = BufferPool(blocks=2)
+    watched = Watched()
+    pool = BufferPool(blocks=2, allocate=watched)
     held = [pool.take(MIB) for _ in range(6)]
-    assert len(pool._blocks) == 6
+    assert len(watched.sizes) == 6
     del held
-    assert len(pool._free) == len(pool._blocks) <= 2
+    assert len(watched.sizes) == 2
 
 
-def test_memory_that_comes_back_in_a_moment_is_waited_for(monkeypatch):
+def test_memory_that_comes_back_in_a_moment_is_waited_for():
     """A thread that reads ahead does not take more memory because it was faster than the caller."""
-    monkeypatch.setattr(buffers, "_PATIENCE_S", 5.0)  # a busy machine may take long over a moment
-    pool = BufferPool(blocks=1)
+    pool = page_pool(blocks=1, patience_s=5.0)  # a busy machine may take long over a moment
     held = [pool.take(MIB)]
     place = held[0].data_ptr()
     timer = threading.Timer(2e-4, held.clear)
@@ -92,7 +111,7 @@ def test_memory_that_comes_back_in_a_moment_is_waited_for(monkeypatch):
 @given(st.lists(st.tuples(st.integers(1, 9 * MIB), st.integers(0, 4)), min_size=1, max_size=25))
 def test_what_is_held_is_never_overwritten(steps):
     """Any sequence of taking, holding and letting go; each block holds a number of its own to its end."""
-    pool = BufferPool(blocks=2)
+    pool = page_pool(blocks=2)
     held: list[tuple[torch.Tensor, int]] = []
     for number, (size, letting_go) in enumerate(steps):
         block = pool.take(size)
@@ -105,7 +124,7 @@ def test_what_is_held_is_never_overwritten(steps):
 
 
 def test_threads_never_share_a_block():
-    pool = BufferPool(blocks=3)
+    pool = page_pool(blocks=3)
     clashes = []
 
     def work(number: int) -> None:
@@ -125,7 +144,7 @@ def test_threads_never_share_a_block():
 
 
 def test_blocks_outlive_their_pool():
-    pool = BufferPool(blocks=2)
+    pool = page_pool(blocks=2)
     block = pool.take(MIB)
     block.fill_(5)
     del pool
@@ -136,12 +155,12 @@ def test_blocks_outlive_their_pool():
 @pytest.mark.skipif(torch.cuda.is_available(), reason="there is a GPU here")
 def test_page_locked_memory_needs_a_gpu():
     with pytest.raises(ConfigError, match="pin_memory needs a CUDA device"):
-        BufferPool(blocks=1, pinned=True)
+        allocator(pinned=True)
 
 
 @pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a GPU")
 def test_page_locked_memory_is_used_again_too():
-    pool = BufferPool(blocks=1, pinned=True)
+    pool = BufferPool(blocks=1, allocate=allocator(pinned=True))
     block = pool.take(MIB)
     place = block.data_ptr()
     assert block.is_pinned()
@@ -150,17 +169,13 @@ def test_page_locked_memory_is_used_again_too():
 
 
 @pytest.mark.timeout(60)
-def test_nobody_waits_on_when_the_moment_ends_just_as_others_take_what_comes_back(monkeypatch):
-    """Several threads wait for a hair's breadth of time while memory comes back bit by bit; then none comes at all."""
-    monkeypatch.setattr(buffers, "_PATIENCE_S", 2e-5)
-    pool = BufferPool(blocks=10**9)
-    memory, is_over = np.zeros(16, np.uint8), threading.Event()
-    pool._block_bytes, pool._allocate = len(memory), np.zeros
+def test_nobody_waits_on_when_the_moment_ends_just_as_others_take_what_comes_back():
+    """Several threads wait for a hair's breadth of time for one block that goes from hand to hand."""
+    pool = BufferPool(blocks=1, allocate=Watched(), patience_s=2e-5)
 
     def take() -> None:
-        while not is_over.is_set():
-            pool._enough = 0  # wait each time, however much was made
-            pool._reused(1)
+        for _ in range(2_000):
+            pool.take(16)
 
     threads = [threading.Thread(target=take, daemon=True) for _ in range(3)]
     interval_s = sys.getswitchinterval()
@@ -168,10 +183,6 @@ def test_nobody_waits_on_when_the_moment_ends_just_as_others_take_what_comes_bac
     try:
         for thread in threads:
             thread.start()
-        for _ in range(100_000):
-            if not pool._free:
-                pool._give_back(memory)
-        is_over.set()
         for thread in threads:
             thread.join(timeout=20)
         assert not any(thread.is_alive() for thread in threads)
