@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from pipelines.artifacts.layout import release_folder
 from pipelines.registry import STAGES, load_stage
@@ -14,7 +13,7 @@ from wsm_data.files.typed_toml import build_config, convert, did_you_mean, load_
 _FOLDER = Path(__file__).parent / "recipes"
 _NAMES = tuple(entry.name for entry in STAGES)
 _READS_RELEASE = frozenset(entry.name for entry in STAGES if entry.reads_release)
-_KEYS: dict[str, Any] = {"stages": tuple[str, ...], "source": str, "summary": str}
+_KEYS: Mapping[str, object] = {"stages": tuple[str, ...], "source": str, "summary": str}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,11 +27,11 @@ class Recipe:
     """
 
     stages: tuple[str, ...]
-    settings: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    settings: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
     source: str = ""
 
 
-def load_recipe(name: str, config: Path | None, changes: Mapping[str, Any]) -> Recipe:
+def load_recipe(name: str, config: Path | None, changes: Mapping[str, object]) -> Recipe:
     """Read a recipe by name or path, and lay a config file and `--set` words over it.
 
     Raises:
@@ -51,21 +50,24 @@ def load_recipe(name: str, config: Path | None, changes: Mapping[str, Any]) -> R
     return Recipe(stages=tuple(one for one in _NAMES if one in stages), settings=settings, source=top.get("source", ""))
 
 
-def stage_sections(values: Mapping[str, Any], where: str) -> dict[str, Mapping[str, Any]]:
+def stage_sections(values: Mapping[str, object], where: str) -> dict[str, Mapping[str, object]]:
     """The sections of a TOML file that are settings of stages.
 
     Raises:
         ConfigError: a key is neither the name of a stage nor a key of a recipe, or a stage's name is no section.
     """
     _require_known(values, (*_NAMES, *_KEYS), where)
-    sections = {name: section for name, section in values.items() if name in _NAMES}
-    for name, section in sections.items():
+    sections: dict[str, Mapping[str, object]] = {}
+    for name, section in values.items():
+        if name in _KEYS:
+            continue
         if not isinstance(section, Mapping):
             raise ConfigError(f"{where}: {name} is a section of settings, found the value {section!r}")
+        sections[name] = section
     return sections
 
 
-def stage_config(recipe: Recipe, name: str, run: Path) -> Any:
+def stage_config(recipe: Recipe, name: str, run: Path) -> object:
     """The config of one stage of a run.
 
     Every input field named after a stage is that stage's folder in the run; what looks at the release decodes it with
@@ -73,7 +75,7 @@ def stage_config(recipe: Recipe, name: str, run: Path) -> Any:
     """
     stage = load_stage(name)
     wanted = input_fields(stage.config_type)
-    inputs: dict[str, Any] = {one: str(run / one) for one in wanted if one in _NAMES}
+    inputs: dict[str, object] = {one: str(run / one) for one in wanted if one in _NAMES}
     settings = recipe.settings.get(name, {})
     if name == "index" and "source" not in settings:
         inputs["source"] = _source(recipe, run)
@@ -94,7 +96,7 @@ def recipe_summaries() -> Mapping[str, str]:
     return {name: convert(str, load_toml(_recipe_path(name))["summary"], "summary") for name in recipe_names()}
 
 
-def _codec_settings(recipe: Recipe) -> Mapping[str, Any]:
+def _codec_settings(recipe: Recipe) -> Mapping[str, object]:
     codec = recipe.settings.get("encode", {}).get("codec", {})
     return codec if isinstance(codec, Mapping) else {}  # `wsm encode` refuses what is no section
 

@@ -33,7 +33,8 @@ def run_recipe(recipe: str, request: StageRequest) -> None:
     options = request.options
     loaded = load_recipe(recipe, request.config, parse_assignments(request.assignments))
     if options.limit or options.only:  # it narrows the first stage; the release says that it is partial
-        loaded = replace(loaded, settings=merge({"pack": {"partial": True}}, loaded.settings))
+        packing = merge({"partial": True}, loaded.settings.get("pack", {}))
+        loaded = replace(loaded, settings={**loaded.settings, "pack": packing})
     run_engine = engine(request.engine)
     out, configs = _choose_folder(loaded, request.out or Path("run"), options.fork)
     first = replace(options, fork=False)

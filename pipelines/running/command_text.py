@@ -5,12 +5,11 @@ import shlex
 from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from enum import Enum
-from typing import Any
 
 from wsm_data.files.typed_toml import dotted
 
 
-def command_text(words: str, config: Any, default: Any) -> str:
+def command_text(words: str, config: object, default: object) -> str:
     """The command that has the settings of `config`; inputs and speed are left out.
 
     Two ways to say the same, on the command line or in a file and in any order, have one text.
@@ -23,8 +22,8 @@ def command_text(words: str, config: Any, default: Any) -> str:
     return " ".join([words, *(f"--set {shlex.quote(word)}" for word in _assignments(config, default))])
 
 
-def _assignments(config: Any, default: Any, where: str = "") -> Iterator[str]:
-    for field in fields(config):
+def _assignments(config: object, default: object, where: str = "") -> Iterator[str]:
+    for field in fields(config):  # type: ignore[arg-type]
         value, old = getattr(config, field.name), getattr(default, field.name)
         name = dotted(where, field.name)
         if field.metadata.get("role") or value == old:
@@ -35,7 +34,7 @@ def _assignments(config: Any, default: Any, where: str = "") -> Iterator[str]:
             yield f"{name}={_toml(value)}"
 
 
-def _toml(value: Any) -> str:
+def _toml(value: object) -> str:
     """A value in TOML; what is None is left out of a table, where it stands for the default."""
     if is_dataclass(value):
         value = {field.name: getattr(value, field.name) for field in fields(value)}

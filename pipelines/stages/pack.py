@@ -5,7 +5,6 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
 
 from pipelines.artifacts.inventory import account_of
 from pipelines.artifacts.layout import clips_folder, codec_path, release_folder
@@ -13,11 +12,11 @@ from pipelines.artifacts.source import indexed_source
 from pipelines.artifacts.split_table import read_split
 from pipelines.running.stage import Finished, Outcome, Settled, Stage, StageContext, Unit
 from pipelines.running.upstream import UpstreamMissing, done_outcomes, pending_units, quarantine_of, require_stage
+from wsm_data.clips.config import ClipConfig
 from wsm_data.codecs.quality import CodecQuality
 from wsm_data.files.digest import digest_json
-from wsm_data.files.typed_toml import INPUT, SELECTION
+from wsm_data.files.typed_toml import INPUT, SELECTION, build_config
 from wsm_data.schema.codec import CodecInfo
-from wsm_data.schema.depth import DepthRange
 from wsm_data.schema.identity import EpisodeId
 from wsm_data.shards.assemble import ReleaseFacts, finish_release
 from wsm_data.shards.fragment import fragment_path, read_fragment_info
@@ -148,14 +147,14 @@ def _finish(config: PackConfig, context: StageContext, settled: Settled) -> Fini
 
 def _facts(config: PackConfig, clips: Mapping[str, Outcome]) -> ReleaseFacts:
     records = {name: require_stage(getattr(config, name), name) for name in ("index", "split", "map", "encode")}
-    clip_settings: Mapping[str, Any] = records["encode"].settings["clip"]
+    clip = build_config(ClipConfig, records["encode"].settings["clip"])
     dataset = indexed_source(config.index).dataset
     return ReleaseFacts(
         name=config.name,
         codec=CodecInfo.from_json(json.loads(codec_path(config.encode).read_text())),
-        depth_range=DepthRange(**clip_settings["depth_range"]),
-        encoded_width_px=clip_settings["width"],
-        encoded_height_px=clip_settings["height"],
+        depth_range=clip.depth_range,
+        encoded_width_px=clip.width,
+        encoded_height_px=clip.height,
         fingerprints={name: record.fingerprint for name, record in records.items()},
         licences={dataset.name: f"{dataset.licence} ({dataset.homepage})" if dataset.homepage else dataset.licence},
         codec_quality=_quality(clips),
@@ -163,7 +162,7 @@ def _facts(config: PackConfig, clips: Mapping[str, Outcome]) -> ReleaseFacts:
     )
 
 
-def _quality(clips: Mapping[str, Outcome]) -> dict[str, Any]:
+def _quality(clips: Mapping[str, Outcome]) -> dict[str, object]:
     """Merged quality of the clips on which it was measured when they were encoded; empty where none was."""
     measured = [outcome.facts["quality"] for _, outcome in sorted(clips.items()) if outcome.facts["quality"]]
     merged: CodecQuality | None = None

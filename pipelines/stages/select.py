@@ -5,7 +5,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import fsspec
 import pyarrow as pa
@@ -150,7 +149,7 @@ def _command(config: SelectConfig) -> str:
     return f"{text} --set scores=SCORES" if config.scores else text
 
 
-def _rule(config: SelectConfig, scores: ScoreTable, chosen: ChosenClips, scores_digest: str) -> dict[str, Any]:
+def _rule(config: SelectConfig, scores: ScoreTable, chosen: ChosenClips, scores_digest: str) -> dict[str, object]:
     """Everything the choice depended on, defaults written out, and what became of the clips."""
     return {
         "settings": settings_of(config),

@@ -4,13 +4,19 @@ import importlib.util
 import shutil
 from collections.abc import Callable, Generator, Iterator, Sequence
 from enum import StrEnum
-from typing import Any
+from typing import Protocol
 
+from pipelines.running.engines.task import ResultT, TaskT
 from wsm_data.errors import ConfigError
 
-Engine = Callable[[Sequence[Any], Callable[[Any], Iterator[Any]], int], Generator[Any, None, None]]
-"""Applies a generator function to every task with so many workers and yields all results, in no particular order
-across tasks. An engine knows no stage and writes no file; whoever consumes it writes the ledger."""
+
+class Engine(Protocol):
+    """Who runs the tasks. An engine knows no stage and writes no file; whoever consumes it writes the ledger."""
+
+    def __call__(
+        self, tasks: Sequence[TaskT], work: Callable[[TaskT], Iterator[ResultT]], workers: int, /
+    ) -> Generator[ResultT, None, None]:
+        """Apply `work` to every task with so many workers; results come in no particular order across tasks."""
 
 
 class EngineName(StrEnum):

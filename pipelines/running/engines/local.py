@@ -10,13 +10,9 @@ from dataclasses import dataclass
 from multiprocessing import forkserver, resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
-from typing import Any, TypeVar
 
-from pipelines.running.engines.task import limit_threads, results_of, unless_failed
+from pipelines.running.engines.task import ResultT, TaskFailed, TaskT, limit_threads, results_of, unless_failed
 from wsm_data.errors import WsmError
-
-TaskT = TypeVar("TaskT")
-ResultT = TypeVar("ResultT")
 
 _DEATH_WAIT_S = 5.0
 
@@ -56,7 +52,9 @@ def run_local(
     yield from _run_pool(tasks, work, min(workers, len(tasks)))
 
 
-def _run_pool(tasks: Sequence[Any], work: Callable[[Any], Iterator[Any]], workers: int) -> Generator[Any, None, None]:
+def _run_pool(
+    tasks: Sequence[TaskT], work: Callable[[TaskT], Iterator[ResultT]], workers: int
+) -> Generator[ResultT, None, None]:
     """One connection a worker, and one task at a time on it.
 
     A queue that all share would hang where a worker dies while it holds the queue's lock, and would lose what does
@@ -73,7 +71,8 @@ def _run_pool(tasks: Sequence[Any], work: Callable[[Any], Iterator[Any]], worker
         while busy:
             ready = wait(busy)
             for connection in [one for one in busy if one in ready]:
-                result = _receive(connection, pool[connection])
+                with _death_named(pool[connection]):
+                    result: ResultT | TaskFailed | _TaskEnded = connection.recv()
                 if not isinstance(result, _TaskEnded):
                     yield unless_failed(result)
                 elif not _give_next(waiting, connection, pool[connection]):
@@ -99,7 +98,7 @@ def _interrupts_held_back() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _start(work: Callable[[Any], Iterator[Any]]) -> tuple[Connection, BaseProcess]:
+def _start(work: Callable[[TaskT], Iterator[ResultT]]) -> tuple[Connection, BaseProcess]:
     context = multiprocessing.get_context("forkserver")
     ours, theirs = context.Pipe()
     process = context.Process(target=_worker, args=(work, theirs), daemon=True)
@@ -108,33 +107,29 @@ def _start(work: Callable[[Any], Iterator[Any]]) -> tuple[Connection, BaseProces
     return ours, process
 
 
-def _give_next(waiting: Iterator[Any], connection: Connection, process: BaseProcess) -> bool:
+def _give_next(waiting: Iterator[TaskT], connection: Connection, process: BaseProcess) -> bool:
     for task in waiting:
-        try:
+        with _death_named(process):
             connection.send(task)
-        except OSError as error:
-            raise _death(process) from error
         return True
     return False
 
 
-def _receive(connection: Connection, process: BaseProcess) -> Any:
+@contextmanager
+def _death_named(process: BaseProcess) -> Iterator[None]:
+    """Turn the end of a connection into an error for a person."""
     try:
-        return connection.recv()
+        yield
     except (EOFError, OSError) as error:
-        raise _death(process) from error
+        process.join(_DEATH_WAIT_S)
+        raise WsmError(
+            f"a worker process died (exit code {process.exitcode}; -9 usually means that memory ran out, 1 that it "
+            "could not start or send a result: its own message stands above); what was finished is kept: run the same "
+            "command again, with fewer --workers if it recurs"
+        ) from error
 
 
-def _death(process: BaseProcess) -> WsmError:
-    process.join(_DEATH_WAIT_S)
-    return WsmError(
-        f"a worker process died (exit code {process.exitcode}; -9 usually means that memory ran out, 1 that it could "
-        "not start or send a result: its own message stands above); what was finished is kept: run the same command "
-        "again, with fewer --workers if it recurs"
-    )
-
-
-def _worker(work: Callable[[Any], Iterator[Any]], connection: Connection) -> None:
+def _worker(work: Callable[[TaskT], Iterator[ResultT]], connection: Connection) -> None:
     threading.Thread(target=_end_with_parent, daemon=True).start()
     limit_threads()
     while True:

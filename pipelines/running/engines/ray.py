@@ -3,15 +3,12 @@
 import logging
 from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
-from typing import Any, TypeVar
+from contextlib import contextmanager
 
 import ray
 
-from pipelines.running.engines.task import limit_threads, results_of, unless_failed
+from pipelines.running.engines.task import ResultT, TaskFailed, TaskT, limit_threads, results_of, unless_failed
 from wsm_data.errors import WsmError
-
-TaskT = TypeVar("TaskT")
-ResultT = TypeVar("ResultT")
 
 
 def run_ray(
@@ -43,38 +40,43 @@ def run_ray(
             ray.shutdown()
 
 
-def _run(tasks: Sequence[Any], work: Callable[[Any], Iterator[Any]], workers: int) -> Generator[Any, None, None]:
+def _run(
+    tasks: Sequence[TaskT], work: Callable[[TaskT], Iterator[ResultT]], workers: int
+) -> Generator[ResultT, None, None]:
     remote = ray.remote(num_cpus=1, max_retries=0, num_returns="streaming")(_stream)
     shared = ray.put(work)
     waiting = deque(tasks)
-    at_work: list[Any] = []
+    at_work: list[Iterator[object]] = []
     try:
         while waiting or at_work:
             while waiting and len(at_work) < max(1, workers):
                 at_work.append(remote.remote(shared, waiting.popleft()))
             ready, at_work = ray.wait(at_work, num_returns=1)
             for stream in ready:
-                for result in _next_of(stream):
-                    at_work.append(stream)
-                    yield unless_failed(result)
+                with _loss_named():
+                    reference = next(stream, None)  # None where the stream has ended
+                    if reference is None:
+                        continue
+                    result: ResultT | TaskFailed = ray.get(reference)
+                at_work.append(stream)
+                yield unless_failed(result)
     finally:
         for stream in at_work:
             ray.cancel(stream, force=True)
 
 
-def _next_of(stream: Any) -> list[Any]:
-    """The stream's next result, or none where it has ended."""
+@contextmanager
+def _loss_named() -> Iterator[None]:
+    """Turn what ray raises into an error for a person."""
     try:
-        return [ray.get(next(stream))]
-    except StopIteration:
-        return []
+        yield
     except ray.exceptions.RayError as error:
         raise WsmError(
             f"ray lost a worker or a result ({error}); what was finished is kept: run the same command again"
         ) from error
 
 
-def _stream(work: Callable[[Any], Iterator[Any]], task: Any) -> Iterator[Any]:
+def _stream(work: Callable[[TaskT], Iterator[ResultT]], task: TaskT) -> Iterator[ResultT | TaskFailed]:
     limit_threads()
     for result in results_of(work, task):  # noqa: UP028 - ray sends values, which `yield from` would hand on to `work`
         yield result

@@ -3,15 +3,11 @@
 from collections.abc import Callable, Generator, Iterator, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
 
 import submitit
 
-from pipelines.running.engines.task import TaskFailed, limit_threads, results_of, unless_failed
+from pipelines.running.engines.task import ResultT, TaskFailed, TaskT, limit_threads, results_of, unless_failed
 from wsm_data.errors import WsmError
-
-TaskT = TypeVar("TaskT")
-ResultT = TypeVar("ResultT")
 
 JOBS_FOLDER = Path("slurm-jobs")
 """Scripts, logs and results of the jobs, below the current folder, which every node must see; safe to delete."""
@@ -50,7 +46,8 @@ def run_slurm(
     failures: list[TaskFailed] = []
     try:
         for job in submitit.helpers.as_completed(jobs, poll_frequency=_POLL_S):
-            for result in _results(job):
+            results: Sequence[ResultT | TaskFailed] = _results(job)
+            for result in results:
                 if isinstance(result, TaskFailed):
                     failures.append(result)
                 else:
@@ -63,10 +60,10 @@ def run_slurm(
                 job.cancel()
 
 
-def _work_on(work: Callable[[Any], Iterator[Any]], tasks: Sequence[Any]) -> list[Any]:
+def _work_on(work: Callable[[TaskT], Iterator[ResultT]], tasks: Sequence[TaskT]) -> list[ResultT | TaskFailed]:
     """Everything the tasks gave, up to the first failure: what was finished before it is kept."""
     limit_threads()
-    results: list[Any] = []
+    results: list[ResultT | TaskFailed] = []
     for task in tasks:
         results += results_of(work, task)
         if results and isinstance(results[-1], TaskFailed):
@@ -74,9 +71,10 @@ def _work_on(work: Callable[[Any], Iterator[Any]], tasks: Sequence[Any]) -> list
     return results
 
 
-def _results(job: Any) -> list[Any]:
+def _results(job: "submitit.Job[Sequence[ResultT | TaskFailed]]") -> Sequence[ResultT | TaskFailed]:
     try:
-        return list(job.result())
+        results: Sequence[ResultT | TaskFailed] = job.result()
+        return results
     except (submitit.core.utils.UncompletedJobError, submitit.core.utils.FailedJobError) as error:
         message = f"job {job.job_id} gave no result ({error}); logs are in {JOBS_FOLDER}. Run the same command again"
         return [TaskFailed(WsmError(message), "")]

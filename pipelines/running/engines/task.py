@@ -3,9 +3,12 @@
 import traceback
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import TypeVar
 
 from wsm_data.errors import WsmError
+
+TaskT = TypeVar("TaskT")
+ResultT = TypeVar("ResultT")
 
 
 @dataclass(frozen=True)
@@ -16,7 +19,7 @@ class TaskFailed:
     trace: str
 
 
-def results_of(work: Callable[[Any], Iterator[Any]], task: Any) -> Iterator[Any]:
+def results_of(work: Callable[[TaskT], Iterator[ResultT]], task: TaskT) -> Iterator[ResultT | TaskFailed]:
     """Results of one task; where it raises, the last one is a `TaskFailed`."""
     try:
         yield from work(task)
@@ -26,7 +29,7 @@ def results_of(work: Callable[[Any], Iterator[Any]], task: Any) -> Iterator[Any]
         yield TaskFailed(None, traceback.format_exc())
 
 
-def unless_failed(result: Any) -> Any:
+def unless_failed(result: ResultT | TaskFailed) -> ResultT:
     """The result, where it is one.
 
     Raises:
