@@ -75,12 +75,13 @@ def survey_clips(release: Release, codec: VideoCodec, config: SurveyConfig | Non
     config = config or SurveyConfig()
     release.require_codec(codec.describe())
     ranked = ranked_keys(release.index.texts("key"))[: config.max_clips]
-    scene_of = {key: release.index.row(key).physical_scene for key in ranked}
+    rows = dict(zip(ranked, map(release.index.row_at, release.index.rows_of(ranked).tolist()), strict=True))
+    scene_of = {key: row.physical_scene for key, row in rows.items()}
     shown = set(_one_per_scene(ranked, scene_of, config.thumbnails))
     paths = {scene: list[ScenePath]() for scene in _distinct(scene_of.values(), config.scenes)}
     facts, thumbnails = [], []
     for key in sorted(ranked):
-        split, clip = release.index.row(key).split, release.read_clip(key)
+        split, clip = rows[key].split, release.read_row(rows[key])
         facts.append(clip_facts(clip))
         if key in shown:
             pictures = decode_pictures(clip, codec, spread_frames(moving_frames(clip), config.pictures))

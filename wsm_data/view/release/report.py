@@ -1,26 +1,21 @@
 """The report of a release: one HTML file that needs nothing else, on a phone, in print, in light and dark."""
 
-import base64
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
-from matplotlib.figure import Figure
 
 from wsm_data.access.release import Release
 from wsm_data.codecs.quality import CodecQuality
 from wsm_data.files.atomic import write_bytes
-from wsm_data.schema.arrays import Uint8Array
 from wsm_data.shards.manifest import release_digest
 from wsm_data.view.clip.facts import ClipFacts
 from wsm_data.view.clip.map_figures import clip_map_figure, scene_map_figure
 from wsm_data.view.clip.map_plot import MAP_SWATCHES, SCENE_SWATCHES
 from wsm_data.view.drawing.depth_colours import depth_gradient
-from wsm_data.view.drawing.style import figure_style, picture_png
-from wsm_data.view.drawing.svg import figure_svg
-from wsm_data.view.drawing.text_table import bytes_text
+from wsm_data.view.drawing.page import data_url, inline_svg, page_template
+from wsm_data.view.drawing.style import figure_style
 from wsm_data.view.release.charts import depth_error_chart, histogram, stage_chart
 from wsm_data.view.release.clip_survey import ClipSurvey, ClipThumbnail
 from wsm_data.view.release.counts import ReleaseCounts, count_release
@@ -71,17 +66,9 @@ def write_report(data: ReportData, release: Release, path: Path) -> None:
 def report_html(data: ReportData, release: Release) -> str:
     """Return the report as one HTML page. Whatever comes from a source is escaped."""
     counts = count_release(release)
-    environment = Environment(
-        loader=PackageLoader("wsm_data.view"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters["bytes"] = bytes_text
     quality = release.manifest.codec_quality
     with figure_style():
-        return environment.get_template(_TEMPLATE).render(
+        return page_template(_TEMPLATE).render(
             manifest=release.manifest,
             digest=release_digest(release.manifest),
             counts=counts,
@@ -113,16 +100,16 @@ def _distribution(number: int, shown: Distribution) -> _Figure:
     note = f"{shown.missing:,} clips have no such number." if shown.missing else ""
     if not shown.values:
         return _Figure(title=shown.title, note="No clip that was read has such a number.", svg=Markup())
-    svg = _svg(histogram(shown), f"distribution-{number}", f"Distribution: {shown.title}")
+    svg = inline_svg(histogram(shown), f"distribution-{number}", f"Distribution: {shown.title}")
     return _Figure(title=shown.title, note=note, svg=svg)
 
 
 def _quality_svg(quality: CodecQuality) -> Markup:
-    return _svg(depth_error_chart(quality.depth), "depth-error", "Mean absolute depth error over true depth")
+    return inline_svg(depth_error_chart(quality.depth), "depth-error", "Mean absolute depth error over true depth")
 
 
 def _stage_svg(data: ReportData) -> Markup:
-    return _svg(stage_chart(data.stages), "stages", "Seconds that each stage took")
+    return inline_svg(stage_chart(data.stages), "stages", "Seconds that each stage took")
 
 
 def _scenes(survey: ClipSurvey) -> list[_Figure]:
@@ -130,7 +117,7 @@ def _scenes(survey: ClipSurvey) -> list[_Figure]:
         _Figure(
             title=scene.scene,
             note=_paths(len(scene.paths)),
-            svg=_svg(
+            svg=inline_svg(
                 scene_map_figure(scene), f"scene-{number}", f"Map of {scene.scene} with {_paths(len(scene.paths))}"
             ),
         )
@@ -150,21 +137,12 @@ def _card(number: int, shown: ClipThumbnail, survey: ClipSurvey) -> _Card:
         dataset=clip.meta.dataset,
         facts=next(facts for facts in survey.facts if facts.key == clip.meta.key),
         frames=pictures.frames,
-        rgb=tuple(_data_url(picture) for picture in pictures.rgb_u8),
-        depth=tuple(_data_url(picture) for picture in pictures.depth_u8),
+        rgb=tuple(data_url(picture) for picture in pictures.rgb_u8),
+        depth=tuple(data_url(picture) for picture in pictures.depth_u8),
         measured=tuple(pictures.depth_valid_share.tolist()),
-        map_svg=_svg(clip_map_figure(clip), f"map-{number}", f"Map and path of {clip.meta.key}"),
+        map_svg=inline_svg(clip_map_figure(clip), f"map-{number}", f"Map and path of {clip.meta.key}"),
     )
 
 
 def _noted(survey: ClipSurvey) -> dict[str, int]:
     return dict(sorted(Counter(note for facts in survey.facts for note in facts.notes).items()))
-
-
-def _svg(figure: Figure, name: str, description: str) -> Markup:
-    # Safe as markup: matplotlib escapes the text of a figure, `figure_svg` escapes the description.
-    return Markup(figure_svg(figure, name, description))  # noqa: S704
-
-
-def _data_url(picture_u8: Uint8Array) -> str:
-    return "data:image/png;base64," + base64.b64encode(picture_png(picture_u8)).decode()

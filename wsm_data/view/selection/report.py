@@ -1,35 +1,30 @@
 """The report of a selection: one HTML file that says what was chosen, and why."""
 
-import base64
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
-from matplotlib.figure import Figure
 
 from wsm_data.access.release import Release
 from wsm_data.codecs.base import VideoCodec
 from wsm_data.curation.explain import score_label, value_text
+from wsm_data.curation.survey import ScoreSurvey, SelectionSurvey, SelectionSurveyConfig, SurveyedClip, survey_selection
 from wsm_data.files.atomic import write_bytes
-from wsm_data.schema.arrays import Float64Array, Uint8Array
+from wsm_data.schema.arrays import Float64Array
+from wsm_data.view.clip.facts import moving_frames
 from wsm_data.view.clip.map_figures import clip_map_figure
 from wsm_data.view.clip.map_plot import MAP_SWATCHES
+from wsm_data.view.clip.pictures import decode_pictures, spread_frames
 from wsm_data.view.drawing.depth_colours import depth_gradient
-from wsm_data.view.drawing.style import figure_style, picture_png
-from wsm_data.view.drawing.svg import figure_svg
+from wsm_data.view.drawing.page import data_url, inline_svg, page_template
+from wsm_data.view.drawing.style import figure_style
 from wsm_data.view.selection.charts import compared_histogram, difficulty_chart, leading_chart
-from wsm_data.view.selection.survey import (
-    ScoreSurvey,
-    SelectionSurvey,
-    SelectionSurveyConfig,
-    ShownClip,
-    survey_selection,
-)
 
 _TEMPLATE = "selection.html.j2"
 _SHOWN_PLACES = 12
+_PICTURES = 6
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,31 +77,30 @@ def write_selection_report(
         ConfigError: selection or scores are of another release.
         IntegrityError: a clip that is shown is damaged.
     """
-    survey = survey_selection(release, name, scores_location, codec, shown)
-    write_bytes(path, selection_html(release, survey).encode("utf-8", "backslashreplace"))
+    survey = survey_selection(release, name, scores_location, shown)
+    write_bytes(path, selection_html(release, survey, codec).encode("utf-8", "backslashreplace"))
 
 
-def selection_html(release: Release, survey: SelectionSurvey) -> str:
-    """Return the report as one HTML page. Whatever comes from a source is escaped."""
-    environment = Environment(
-        loader=PackageLoader("wsm_data.view"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+def selection_html(release: Release, survey: SelectionSurvey, codec: VideoCodec) -> str:
+    """Return the report as one HTML page. Whatever comes from a source is escaped.
+
+    Raises:
+        ConfigError: the codec is not the release's.
+        IntegrityError: a clip that is shown is damaged.
+    """
     ruling = [one for one in survey.scores if one.weight]
+    card = partial(_card, release, codec)
     with figure_style():
-        return environment.get_template(_TEMPLATE).render(
+        return page_template(_TEMPLATE).render(
             manifest=release.manifest,
             selection=survey.selection,
             counts=survey.selection.rule["clips"],
             config=survey.config,
             scores=[_score(number, one) for number, one in enumerate(survey.scores) if len(one.values)],
-            difficulty_svg=_svg(
+            difficulty_svg=inline_svg(
                 difficulty_chart(survey.difficulty, survey.selection.scores), "difficulty", "Distribution of difficulty"
             ),
-            leading_svg=_svg(
+            leading_svg=inline_svg(
                 leading_chart([score_label(one.info) for one in ruling], [one.leads for one in ruling]),
                 "leading",
                 "Chosen clips by the score that made them hard",
@@ -116,8 +110,8 @@ def selection_html(release: Release, survey: SelectionSurvey) -> str:
             others=survey.others,
             bootstrap=survey.bootstrap,
             bootstrap_range=_range(survey.bootstrap.jaccard),
-            hardest=[_card(f"hard-{number}", one) for number, one in enumerate(survey.hardest)],
-            borderline=[_card(f"border-{number}", one) for number, one in enumerate(survey.borderline)],
+            hardest=[card(f"hard-{number}", one) for number, one in enumerate(survey.hardest)],
+            borderline=[card(f"border-{number}", one) for number, one in enumerate(survey.borderline)],
             listed=survey.listed,
             map_swatches=MAP_SWATCHES,
             depth_gradient=depth_gradient(),
@@ -136,7 +130,7 @@ def _score(number: int, one: ScoreSurvey) -> _ScoreRow:
         leads=one.leads,
         median=_median(one.values, one.info.unit),
         chosen_median=_median(one.chosen, one.info.unit),
-        svg=_svg(figure, f"score-{number}", f"Distribution of {label} over all clips and over the chosen ones"),
+        svg=inline_svg(figure, f"score-{number}", f"Distribution of {label} over all clips and over the chosen ones"),
     )
 
 
@@ -149,24 +143,16 @@ def _range(overlaps: tuple[float, ...]) -> tuple[float, float, float] | None:
     return (float(np.median(overlaps)), min(overlaps), max(overlaps)) if overlaps else None
 
 
-def _card(name: str, shown: ShownClip) -> _Card:
-    pictures = shown.pictures
+def _card(release: Release, codec: VideoCodec, name: str, shown: SurveyedClip) -> _Card:
+    clip = release.read_clip(shown.key)
+    pictures = decode_pictures(clip, codec, spread_frames(moving_frames(clip), _PICTURES))
     return _Card(
-        key=shown.clip.meta.key,
+        key=shown.key,
         rank=shown.rank,
         difficulty=shown.difficulty,
         why=shown.why,
         frames=pictures.frames,
-        rgb=tuple(_data_url(picture) for picture in pictures.rgb_u8),
-        depth=tuple(_data_url(picture) for picture in pictures.depth_u8),
-        map_svg=_svg(clip_map_figure(shown.clip), name, f"Map and path of {shown.clip.meta.key}"),
+        rgb=tuple(data_url(picture) for picture in pictures.rgb_u8),
+        depth=tuple(data_url(picture) for picture in pictures.depth_u8),
+        map_svg=inline_svg(clip_map_figure(clip), name, f"Map and path of {shown.key}"),
     )
-
-
-def _svg(figure: Figure, name: str, description: str) -> Markup:
-    # Safe as markup: matplotlib escapes the text of a figure, `figure_svg` escapes the description.
-    return Markup(figure_svg(figure, name, description))  # noqa: S704
-
-
-def _data_url(picture_u8: Uint8Array) -> str:
-    return "data:image/png;base64," + base64.b64encode(picture_png(picture_u8)).decode()

@@ -3,17 +3,17 @@ import re
 import pytest
 
 from wsm_data.curation.rule import RuleConfig, RuleKind
+from wsm_data.curation.survey import SelectionSurveyConfig, survey_selection
 from wsm_data.shards.manifest import release_digest
 from wsm_data.view.selection.report import selection_html, write_selection_report
-from wsm_data.view.selection.survey import SelectionSurveyConfig, survey_selection
 
-SHOWN = SelectionSurveyConfig(hardest=1, borderline=1, pictures=4, samples=3)
+SHOWN = SelectionSurveyConfig(hardest=1, borderline=1, samples=3)
 
 
 @pytest.fixture(scope="module")
 def html(selected, made):
-    survey = survey_selection(selected.release, "hard", selected.scores, made.codec, SHOWN)
-    return selection_html(selected.release, survey)
+    survey = survey_selection(selected.release, "hard", selected.scores, SHOWN)
+    return selection_html(selected.release, survey, made.codec)
 
 
 def text_of(html):
@@ -41,7 +41,7 @@ def test_what_was_chosen_and_why_is_said(html, selected):
 def test_every_score_has_a_distribution_and_every_shown_clip_pictures_and_a_map(html):
     assert html.count('aria-label="Distribution of') == 1 + 3  # difficulty and three scores
     assert html.count("<article>") == 3
-    assert html.count('alt="decoded RGB') == html.count('alt="decoded depth') == 3 * 4
+    assert html.count('alt="decoded RGB') == html.count('alt="decoded depth') == 3 * 6
     assert html.count('aria-label="Map and path of') == 3
 
 
@@ -56,9 +56,10 @@ def test_overlaps_and_quotas_are_shown(html):
         assert words in text
 
 
-def test_a_lexicographic_rule_is_told_in_its_own_words_and_order(survey_of, selected):
+def test_a_lexicographic_rule_is_told_in_its_own_words_and_order(survey_of, selected, made):
     rule = RuleConfig(kind=RuleKind.LEXICOGRAPHIC, order=("cost", "unsafe"))
-    text = text_of(selection_html(selected.release, survey_of(rule, unsafe=[0.1, 0.9, 0.5, 0.2], cost=[5, 5, 5, 1])))
+    survey = survey_of(rule, unsafe=[0.1, 0.9, 0.5, 0.2], cost=[5, 5, 5, 1])
+    text = text_of(selection_html(selected.release, survey, made.codec))
     assert "tells each chosen clip from the first one that was left out" in text
     assert "weighted share" not in text
     assert text.index("cost higher is harder 1.") < text.index("unsafe higher is harder 2.")

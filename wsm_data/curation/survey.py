@@ -1,4 +1,4 @@
-"""Everything the report of a selection shows: numbers of all its clips, pictures of some."""
+"""What a selection came to: its scores and quotas beside those of all clips, and the clips at its top and border."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,7 +10,6 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from wsm_data.access.release import Release
-from wsm_data.codecs.base import VideoCodec
 from wsm_data.curation.exclusion import excluded_clips
 from wsm_data.curation.explain import ExplainedScore, deciding_scores, explain_clips, leading_scores
 from wsm_data.curation.key_order import key_hashes
@@ -22,27 +21,22 @@ from wsm_data.curation.stability import BootstrapOverlap, bootstrap_overlap, jac
 from wsm_data.errors import ConfigError
 from wsm_data.files.typed_toml import build_config
 from wsm_data.schema.arrays import Float64Array
-from wsm_data.schema.clip import Clip
 from wsm_data.shards.selection import Selection, read_selection, selection_names
-from wsm_data.view.clip.facts import moving_frames
-from wsm_data.view.clip.pictures import ClipPictures, decode_pictures, spread_frames
 
 
 @dataclass(frozen=True, kw_only=True)
 class SelectionSurveyConfig:
-    """How much of a selection is shown.
+    """How much of a selection is looked at one by one.
 
     Attributes:
-        hardest: clips with pictures from the top.
-        borderline: clips with pictures on either side of the border.
-        pictures: frames of each.
+        hardest: clips from the top.
+        borderline: clips on either side of the border.
         listed: clips in the list of reasons.
         samples: bootstrap samples.
     """
 
     hardest: int = 5
     borderline: int = 2
-    pictures: int = 6
     listed: int = 100
     samples: int = 20
 
@@ -87,22 +81,20 @@ class PlaceCount:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ShownClip:
-    """A clip with pictures.
+class SurveyedClip:
+    """A clip that stands for others.
 
     Attributes:
+        key: the clip.
         rank: 1 for the hardest; None for one that was not chosen.
         difficulty: under the rule, in [0, 1].
         why: what makes it hard.
-        clip: the clip.
-        pictures: some frames.
     """
 
+    key: str
     rank: int | None
     difficulty: float
     why: str
-    clip: Clip
-    pictures: ClipPictures
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -127,28 +119,26 @@ class SelectionSurvey:
     scores: tuple[ScoreSurvey, ...]
     difficulty: Float64Array
     places: dict[str, tuple[PlaceCount, ...]]
-    hardest: tuple[ShownClip, ...]
-    borderline: tuple[ShownClip, ...]
+    hardest: tuple[SurveyedClip, ...]
+    borderline: tuple[SurveyedClip, ...]
     others: tuple[tuple[str, int, int, float], ...]
     bootstrap: BootstrapOverlap
     listed: tuple[tuple[int, str, float, str], ...]
 
 
 def survey_selection(
-    release: Release, name: str, scores_location: str, codec: VideoCodec, shown: SelectionSurveyConfig | None = None
+    release: Release, name: str, scores_location: str, shown: SelectionSurveyConfig | None = None
 ) -> SelectionSurvey:
-    """Rate the clips again as the selection did, and read those that are shown.
+    """Rate the clips again as the selection did. No clip is read.
 
     Args:
         release: the release.
         name: name of the selection, or path of its file.
         scores_location: the scores it was made from.
-        codec: the codec of the release.
-        shown: how much is shown.
+        shown: how much is looked at.
 
     Raises:
-        ConfigError: selection or scores are of another release, or the codec is another.
-        IntegrityError: a clip that is shown is damaged.
+        ConfigError: selection or scores are of another release.
     """
     shown = shown or SelectionSurveyConfig()
     digest = release.digest
@@ -158,16 +148,16 @@ def survey_selection(
     index = release.index.columns(INDEX_COLUMNS)
     rows = release.index.rows_of(selection.keys)
     state = _rated(index, scores, config, rows)
-    show = partial(_shown, release, codec, shown.pictures, state)
     last = max(shown.hardest, len(rows) - shown.borderline)
+    border = (*state.chosen[last:], *state.left[: shown.borderline])
     return SelectionSurvey(
         selection=selection,
         config=config,
         scores=_score_surveys(state),
         difficulty=state.difficulty,
         places=_places(state, selection),
-        hardest=tuple(show(number) for number in state.chosen[: shown.hardest]),
-        borderline=tuple(show(number) for number in (*state.chosen[last:], *state.left[: shown.borderline])),
+        hardest=tuple(_surveyed(state, number) for number in state.chosen[: shown.hardest]),
+        borderline=tuple(_surveyed(state, number) for number in border),
         others=_others(release, selection, digest, rows),
         bootstrap=bootstrap_overlap(
             index, scores, partial(read_paths, scores_location), config, rows, samples=shown.samples
@@ -295,15 +285,13 @@ def _places(state: _Rated, selection: Selection) -> dict[str, tuple[PlaceCount, 
     return found
 
 
-def _shown(release: Release, codec: VideoCodec, pictures: int, state: _Rated, number: int) -> ShownClip:
-    clip = release.read_clip(state.index["key"][int(state.rows[number])].as_py())
+def _surveyed(state: _Rated, number: int) -> SurveyedClip:
     place = np.flatnonzero(state.chosen == number)
-    return ShownClip(
+    return SurveyedClip(
+        key=state.index["key"][int(state.rows[number])].as_py(),
         rank=int(place[0]) + 1 if len(place) else None,
         difficulty=float(state.difficulty[number]),
         why=state.why[int(number)].as_py(),
-        clip=clip,
-        pictures=decode_pictures(clip, codec, spread_frames(moving_frames(clip), pictures)),
     )
 
 

@@ -1,19 +1,20 @@
 import numpy as np
 import pyarrow as pa
 import pytest
+from walled_release import UNITS, build_release
 
 from wsm_data.curation.key_order import key_hashes
 from wsm_data.curation.rule import RuleConfig, RuleKind
+from wsm_data.curation.survey import SelectionSurveyConfig, selection_settings, survey_selection
 from wsm_data.errors import ConfigError
 from wsm_data.shards.selection import selection_path, write_selection
-from wsm_data.view.selection.survey import SelectionSurveyConfig, selection_settings, survey_selection
 
-SHOWN = SelectionSurveyConfig(hardest=1, borderline=1, pictures=2, samples=3)
+SHOWN = SelectionSurveyConfig(hardest=1, borderline=1, samples=3)
 
 
 @pytest.fixture(scope="module")
-def survey(selected, made):
-    return survey_selection(selected.release, "hard", selected.scores, made.codec, SHOWN)
+def survey(selected):
+    return survey_selection(selected.release, "hard", selected.scores, SHOWN)
 
 
 def test_the_settings_are_read_from_the_selection(survey, selected):
@@ -45,12 +46,11 @@ def test_quotas_are_counted_as_they_were_filled(survey):
 def test_the_hardest_and_both_sides_of_the_border_are_shown(survey, selected):
     assert [one.rank for one in survey.hardest] == [1]
     assert [one.rank for one in survey.borderline] == [2, None]
-    keys = [one.clip.meta.key for one in (*survey.hardest, *survey.borderline)]
+    keys = [one.key for one in (*survey.hardest, *survey.borderline)]
     assert keys[:2] == survey.selection.keys.to_pylist()
     assert keys[2] not in keys[:2]
     assert survey.hardest[0].difficulty == survey.selection.scores[0]
     assert survey.hardest[0].why == survey.selection.why[0].as_py()
-    assert len(survey.hardest[0].pictures.frames) == 2
 
 
 def test_other_selections_are_compared_and_those_of_other_releases_passed_over(survey):
@@ -66,11 +66,11 @@ def test_the_list_is_that_of_the_file(survey):
     assert [row[:2] for row in survey.listed] == list(enumerate(survey.selection.keys.to_pylist(), start=1))
 
 
-def test_a_selection_of_another_release_is_refused(selected, made, tmp_path):
-    other = made.release(tmp_path, dict(list(made.units.items())[:3]))
+def test_a_selection_of_another_release_is_refused(selected, tmp_path):
+    other = build_release(tmp_path, dict(list(UNITS.items())[:3]))
     write_selection(tmp_path / "release" / selection_path("hard"), selected.selection)
     with pytest.raises(ConfigError, match="was made from the release with digest"):
-        survey_selection(other, "hard", selected.scores, made.codec, SHOWN)
+        survey_selection(other, "hard", selected.scores, SHOWN)
 
 
 def test_at_the_border_stand_the_last_that_was_chosen_and_the_first_that_is_no_harder(survey_of, selected):
@@ -79,7 +79,7 @@ def test_at_the_border_stand_the_last_that_was_chosen_and_the_first_that_is_no_h
     index = selected.release.index.columns(["key", "split"])
     train = [row["key"] for row in index.to_pylist() if row["split"] == "train"]
     assert survey.selection.keys.to_pylist() == [train[0], train[2]]
-    assert [(one.rank, one.clip.meta.key) for one in survey.borderline] == [(2, train[2]), (None, train[3])]
+    assert [(one.rank, one.key) for one in survey.borderline] == [(2, train[2]), (None, train[3])]
 
 
 def test_clips_as_hard_as_the_easiest_chosen_one_are_left_out_in_the_order_of_the_walk(survey_of, selected):
@@ -88,7 +88,7 @@ def test_clips_as_hard_as_the_easiest_chosen_one_are_left_out_in_the_order_of_th
     train = [row["key"] for row in index.to_pylist() if row["split"] == "train"]
     walk = [train[number] for number in np.argsort(key_hashes(pa.array(train)))]
     assert survey.selection.keys.to_pylist() == walk[:2]
-    assert [one.clip.meta.key for one in survey.borderline] == [walk[1], walk[2]]
+    assert [one.key for one in survey.borderline] == [walk[1], walk[2]]
 
 
 def test_scores_of_a_lexicographic_rule_stand_in_its_order_and_lead_by_what_told_clips_apart(survey_of):
