@@ -2,13 +2,11 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import StrEnum
 from types import MappingProxyType
 
-from wsm_data.errors import ConfigError
 from wsm_data.schema.camera import Intrinsics
-
-LAYOUTS = ("scene_archive", "scene_folder", "trajectory_folder")
-MATRICES = ("nested", "flat")
+from wsm_data.schema.layout import Layout
 
 CAMERAS: Mapping[str, Intrinsics] = MappingProxyType(
     {
@@ -17,6 +15,13 @@ CAMERAS: Mapping[str, Intrinsics] = MappingProxyType(
     }
 )
 """The two cameras of InternData-N1: d435i as measured on it, zed as in the start-goal benchmark's robot."""
+
+
+class Matrices(StrEnum):
+    """How a column of the parquet files holds matrices: as a list of rows, or as one list of all numbers."""
+
+    NESTED = "nested"
+    FLAT = "flat"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,8 +34,8 @@ class SynthConfig:
         trajectories: trajectories per scene and camera.
         cameras: names out of `CAMERAS`; every scene is recorded once with each.
         group_prefix: groups are named `<prefix>_<camera>`.
-        layout: `scene_archive`, `scene_folder` or `trajectory_folder` (see `writers.scenes`).
-        matrices: matrices in the parquet files as `nested` lists or `flat` ones.
+        layout: how the files are laid out.
+        matrices: how the parquet files hold matrices.
         image_scale: scale of the images against the cameras' own; below 1 for tests.
         min_frames: shortest trajectory.
         max_frames: longest trajectory.
@@ -59,8 +64,8 @@ class SynthConfig:
     trajectories: int = 4
     cameras: tuple[str, ...] = ("d435i", "zed")
     group_prefix: str = "synth"
-    layout: str = "scene_archive"
-    matrices: str = "nested"
+    layout: Layout = Layout.SCENE_ARCHIVE
+    matrices: Matrices = Matrices.NESTED
     image_scale: float = 1.0
     min_frames: int = 120
     max_frames: int = 320
@@ -84,18 +89,17 @@ class SynthConfig:
     archive_level: int = 1
 
     def __post_init__(self) -> None:
-        _require_one_of("layout", self.layout, LAYOUTS)
-        _require_one_of("matrices", self.matrices, MATRICES)
         for camera in self.cameras:
-            _require_one_of("cameras", camera, tuple(CAMERAS))
+            if camera not in CAMERAS:
+                raise ValueError(f"cameras must be of {', '.join(CAMERAS)}, found {camera!r}")
         for name in ("scenes", "trajectories"):
             if getattr(self, name) < 1:
-                raise ConfigError(f"synth.{name} must be at least 1, found {getattr(self, name)}")
+                raise ValueError(f"{name} must be at least 1, found {getattr(self, name)}")
         _require_range("frames", 2, self.min_frames, self.max_frames, 999)
         _require_range("step_m", 1e-3, self.min_step_m, self.max_step_m, 1.0)
         _require_range("camera_height_m", 0.2, self.min_camera_height_m, self.max_camera_height_m, 1.9)
         if not 0 < self.image_scale <= 4:
-            raise ConfigError(f"synth.image_scale must lie in (0, 4], found {self.image_scale}")
+            raise ValueError(f"image_scale must lie in (0, 4], found {self.image_scale}")
 
     def group(self, camera: str) -> str:
         """Name of the group that holds the recordings of one camera."""
@@ -113,11 +117,6 @@ class SynthConfig:
         return full.resized(round(full.width * self.image_scale), round(full.height * self.image_scale))
 
 
-def _require_one_of(name: str, value: str, allowed: tuple[str, ...]) -> None:
-    if value not in allowed:
-        raise ConfigError(f"synth.{name} must be one of {', '.join(allowed)}, found {value!r}")
-
-
 def _require_range(name: str, least: float, low: float, high: float, most: float) -> None:
     if not least <= low <= high <= most:
-        raise ConfigError(f"synth needs {least} <= min_{name} <= max_{name} <= {most}, found {low} and {high}")
+        raise ValueError(f"{least} <= min_{name} <= max_{name} <= {most} must hold, found {low} and {high}")

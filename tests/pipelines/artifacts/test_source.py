@@ -13,9 +13,10 @@ from pipelines.running.options import RunOptions
 from pipelines.running.runner import run_stage
 from pipelines.stages.index import STAGE, IndexConfig
 from wsm_data.errors import ConfigError, IntegrityError
-from wsm_data.readers.interndata.containers import Layout, find_containers
+from wsm_data.readers.interndata.containers import find_containers
 from wsm_data.readers.manifest import load_dataset
 from wsm_data.schema.dataset import CameraModel
+from wsm_data.schema.layout import Layout
 
 
 @pytest.fixture

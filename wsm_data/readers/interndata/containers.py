@@ -5,7 +5,6 @@ import os
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 from pathlib import Path
 
 from wsm_data.errors import ConfigError
@@ -13,6 +12,7 @@ from wsm_data.files.digest import digest_json
 from wsm_data.readers.source import Container
 from wsm_data.readers.unreadable import error_name
 from wsm_data.schema.dataset import DatasetManifest
+from wsm_data.schema.layout import Layout
 
 _log = logging.getLogger(__name__)
 
@@ -29,14 +29,6 @@ _ARCHIVE = re.compile(r"(?P<scene>.+?)\.(tar\.gz|tgz|tar|tar\.[a-z0-9]+|zip|gz)"
 _UNFINISHED = re.compile(
     r"(?P<whole>.+)\.(part|partial|incomplete|crdownload|download|opdownload|aria2|filepart)", re.I
 )
-
-
-class Layout(StrEnum):
-    """The three forms in which trajectories are published."""
-
-    SCENE_ARCHIVE = "scene_archive"
-    SCENE_FOLDER = "scene_folder"
-    TRAJECTORY_FOLDER = "trajectory_folder"
 
 
 def find_containers(source: Path, dataset: DatasetManifest) -> list[Container]:

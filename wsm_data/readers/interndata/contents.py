@@ -8,13 +8,13 @@ from wsm_data.errors import DataError, Reason
 from wsm_data.files.digest import xxh3_128
 from wsm_data.readers.archive.tar_walk import Member
 from wsm_data.readers.images import check_jpeg, check_png16
-from wsm_data.readers.interndata.containers import Layout
 from wsm_data.readers.interndata.episode_meta import read_image_spans, read_lengths
 from wsm_data.readers.interndata.naming import ImageSpan, Kind, Role, role_of
 from wsm_data.readers.interndata.scene_files import iter_members, scene_cloud
 from wsm_data.readers.interndata.table import EpisodeTable, read_table
 from wsm_data.readers.ply import read_point_cloud, require_finite_points
 from wsm_data.readers.source import Container
+from wsm_data.schema.layout import Layout
 from wsm_data.schema.point_cloud import PointCloud
 
 FrameKey = tuple[int | None, int]

@@ -5,7 +5,6 @@ from pathlib import Path
 
 from wsm_data.errors import DataError, IntegrityError
 from wsm_data.files.digest import xxh3_128
-from wsm_data.readers.interndata.containers import Layout
 from wsm_data.readers.interndata.record import digest_frames
 from wsm_data.readers.interndata.scene_files import iter_members
 from wsm_data.readers.source import Container
@@ -13,6 +12,7 @@ from wsm_data.readers.unreadable import read_file
 from wsm_data.schema.dataset import DatasetManifest
 from wsm_data.schema.episode import EpisodeRecord
 from wsm_data.schema.frames import EpisodeFrames
+from wsm_data.schema.layout import Layout
 
 
 def iter_episode_frames(

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from wsm_data.errors import DataError, Reason
-from wsm_data.readers.interndata.containers import EXPECTS, Layout, place_of
+from wsm_data.readers.interndata.containers import EXPECTS, place_of
 from wsm_data.readers.interndata.contents import Contents, FolderContents, FrameKey, read_contents
 from wsm_data.readers.interndata.naming import episode_name
 from wsm_data.readers.interndata.path_points import without_path
@@ -14,6 +14,7 @@ from wsm_data.readers.source import Container, ContainerScan, DepthSample
 from wsm_data.schema.dataset import CloudColours, DatasetManifest
 from wsm_data.schema.episode import EpisodeRecord
 from wsm_data.schema.identity import EpisodeId
+from wsm_data.schema.layout import Layout
 from wsm_data.schema.point_cloud import PointCloud
 from wsm_data.schema.verdict import Refusal
 

@@ -7,9 +7,10 @@ from pathlib import Path
 
 from wsm_data.errors import DataError, Reason
 from wsm_data.readers.archive.tar_walk import Member, walk_tar
-from wsm_data.readers.interndata.containers import CONTENT_FOLDERS, SCENE_CLOUD, Layout, is_unfinished
+from wsm_data.readers.interndata.containers import CONTENT_FOLDERS, SCENE_CLOUD, is_unfinished
 from wsm_data.readers.source import Container
 from wsm_data.readers.unreadable import read_file, refusing_unreadable
+from wsm_data.schema.layout import Layout
 
 _READ_FOLDER = re.compile(r"data|meta|videos|(data|videos)/[^/]+|videos/[^/]+/observation\.images\.(rgb|depth)")
 

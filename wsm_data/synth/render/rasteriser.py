@@ -252,7 +252,7 @@ def _at(planes: Float64Array, row: int, k: int, x: int, y: int, z: float) -> flo
 
 
 @njit(cache=True)  # type: ignore[untyped-decorator]
-def shade(
+def shade(  # one loop over pixels: the heart of the renderer's speed, not worth cutting up
     inv_z: Float64Array,
     ids: "np.ndarray",
     planes: Float64Array,

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from wsm_data.codecs.ply import ply_bytes
 from wsm_data.files.atomic import write_bytes
+from wsm_data.schema.layout import Layout
 from wsm_data.synth.config import SynthConfig
 from wsm_data.synth.home.home import home_glb
 from wsm_data.synth.writers.cloud import with_path
@@ -43,10 +44,10 @@ def write_scene(out: Path, scene_index: int, camera: str, config: SynthConfig) -
 def write_recording(out: Path, recording: SceneRecording, config: SynthConfig) -> list[str]:
     """What `write_scene` does, for a recording that is planned already."""
     group, scene = config.group(recording.camera), config.scene_name(recording.scene_index)
-    if config.layout == "scene_archive":
+    if config.layout == Layout.SCENE_ARCHIVE:
         write_archive(out / group / f"{scene}.tar.gz", scene, _scene_members(recording, config), config.archive_level)
         return [f"{group}/{scene}.tar.gz"]
-    if config.layout == "scene_folder":
+    if config.layout == Layout.SCENE_FOLDER:
         write_folder(out / group / scene, _scene_members(recording, config))
         return [f"{group}/{scene}"]
     names = [f"trajectory_{number:02d}" for number in range(len(recording.episodes))]

@@ -8,17 +8,18 @@ import pyarrow.parquet as pq
 
 from wsm_data.schema.arrays import Float32Array
 from wsm_data.schema.camera import Intrinsics
+from wsm_data.synth.config import Matrices
 from wsm_data.synth.drive.expert import Episode
 
 
-def episode_table(episode: Episode, intrinsics: Intrinsics, first_index: int, matrices: str) -> bytes:
+def episode_table(episode: Episode, intrinsics: Intrinsics, first_index: int, matrices: Matrices) -> bytes:
     """One row per frame: index, camera matrix, mount, and the camera's pose (OpenGL axes, camera to world).
 
     Args:
         episode: the recording.
         intrinsics: of its images.
         first_index: global number of its first frame.
-        matrices: `nested` lists of rows, or `flat` ones.
+        matrices: how matrices are held.
     """
     frames = len(episode.T_world_opengl)
     K = np.broadcast_to(intrinsics.matrix.astype(np.float32), (frames, 3, 3))
@@ -34,11 +35,11 @@ def episode_table(episode: Episode, intrinsics: Intrinsics, first_index: int, ma
     return sink.getvalue()
 
 
-def _matrix_column(values: Float32Array, matrices: str) -> pa.Array:
+def _matrix_column(values: Float32Array, matrices: Matrices) -> pa.Array:
     """Matrices [T, N, N] as lists of lists of float, or as lists of N * N floats."""
     count, rows, columns = values.shape
     floats = pa.array(np.ascontiguousarray(values).reshape(-1))
-    if matrices == "flat":
+    if matrices == Matrices.FLAT:
         return pa.ListArray.from_arrays(_offsets(count, rows * columns), floats)
     lines = pa.ListArray.from_arrays(_offsets(count * rows, columns), floats)
     return pa.ListArray.from_arrays(_offsets(count, rows), lines)

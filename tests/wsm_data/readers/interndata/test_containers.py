@@ -4,7 +4,8 @@ import os
 import pytest
 
 from wsm_data.errors import ConfigError
-from wsm_data.readers.interndata.containers import Layout, Place, find_containers, place_of
+from wsm_data.readers.interndata.containers import Place, find_containers, place_of
+from wsm_data.schema.layout import Layout
 
 
 def refuse_listing(monkeypatch, name):
