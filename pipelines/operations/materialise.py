@@ -51,7 +51,6 @@ def _list_units(config: MaterialiseConfig) -> Sequence[Unit]:
 def _process(batch: Sequence[Unit], config: MaterialiseConfig, context: StageContext) -> Iterator[Outcome]:
     release, folder = open_release(config.release), release_folder(context.out)
     for unit in batch:
-        (folder / MANIFEST_NAME).unlink(missing_ok=True)  # a release that is being rewritten is unfinished
         path = folder / unit.payload.name
         shard = copy_shard(path, unit.payload, release)
         facts = {"clips": shard.clips, "bytes": shard.bytes, "shard": asdict(shard)}

@@ -115,7 +115,6 @@ def _process(batch: Sequence[Unit], config: PackConfig, context: StageContext) -
     release, clips = release_folder(context.out), clips_folder(config.encode)
     for unit in batch:
         layout: ShardLayout = unit.payload
-        (release / MANIFEST_NAME).unlink(missing_ok=True)  # a release that is being rewritten is unfinished
         path = release / layout.name
         shard = write_shard(path, layout, lambda key: fragment_path(clips, key))
         facts = {"clips": shard.clips, "bytes": shard.bytes, "shard": asdict(shard)}

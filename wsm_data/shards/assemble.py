@@ -15,7 +15,7 @@ from wsm_data.shards.fragment import FragmentInfo
 from wsm_data.shards.index import IndexTable, index_table, write_index
 from wsm_data.shards.index_row import SCHEMA, IndexRow, index_row
 from wsm_data.shards.inventory import InventoryRow, UnitState, count_reasons, write_inventory, write_quarantine
-from wsm_data.shards.manifest import ReleaseManifest, ShardInfo, manifest_bytes
+from wsm_data.shards.manifest import ReleaseManifest, ShardInfo, manifest_bytes, withdraw_manifest
 from wsm_data.shards.names import (
     INDEX_NAME,
     INVENTORY_NAME,
@@ -45,8 +45,8 @@ class ReleaseFacts:
 
 
 def begin_release(folder: Path) -> None:
-    """Withdraw the manifest before the first shard is written, so that a half-packed release is seen as unfinished."""
-    (folder / MANIFEST_NAME).unlink(missing_ok=True)
+    """Withdraw the manifest and clear away what killed writers left; call it while nobody writes a shard."""
+    withdraw_manifest(folder)
     if folder.exists():
         remove_temporaries(folder)
 

@@ -3,13 +3,14 @@
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
+from pathlib import Path
 from typing import Any
 
 from wsm_data.errors import IntegrityError
 from wsm_data.files.digest import digest_json, sha256_bytes
 from wsm_data.schema.codec import CodecInfo
 from wsm_data.schema.depth import DepthRange
-from wsm_data.shards.names import is_shard_name
+from wsm_data.shards.names import MANIFEST_NAME, is_shard_name
 from wsm_data.shards.statistics import LatentStatistics
 
 RELEASE_SCHEMA_VERSION = 1
@@ -134,6 +135,11 @@ def parse_manifest(data: bytes, where: str) -> ReleaseManifest:
     except (ValueError, TypeError, KeyError) as error:
         raise IntegrityError(f"{where} must be the manifest of a release, but: {error}") from error
     return manifest
+
+
+def withdraw_manifest(folder: Path) -> None:
+    """Remove dataset.json, so that a release that is being written, or written again, is seen as unfinished."""
+    (folder / MANIFEST_NAME).unlink(missing_ok=True)
 
 
 def _from_json(record: Mapping[str, Any]) -> ReleaseManifest:

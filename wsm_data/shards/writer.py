@@ -9,7 +9,7 @@ import xxhash
 from wsm_data.errors import IntegrityError
 from wsm_data.files.atomic import atomic_file
 from wsm_data.shards.fragment import FragmentInfo, read_fragment_info
-from wsm_data.shards.manifest import ShardInfo
+from wsm_data.shards.manifest import ShardInfo, withdraw_manifest
 from wsm_data.shards.shard_layout import PlacedClip, ShardLayout
 from wsm_data.shards.tar_format import END_OF_ARCHIVE
 
@@ -37,7 +37,7 @@ def write_shard(path: Path, layout: ShardLayout, path_of: Callable[[str], Path])
 def write_blocks(
     path: Path, layout: ShardLayout, blocks_of: Callable[[PlacedClip], Iterable[bytes | memoryview]]
 ) -> ShardInfo:
-    """Write the shard of a layout at `path`, atomically, from the bytes of its clips.
+    """Write the shard of a layout at `path`, atomically, from the bytes of its clips; the release is unfinished then.
 
     Args:
         path: where the shard goes; its name must be that of the layout.
@@ -50,6 +50,7 @@ def write_blocks(
     """
     if path.name != layout.name:
         raise ValueError(f"the shard {layout.name} must be written under its own name, found {path.name}")
+    withdraw_manifest(path.parent)
     digest = hashlib.sha256()
     size = 0
     with atomic_file(path) as file:

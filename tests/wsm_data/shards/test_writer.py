@@ -35,6 +35,13 @@ def test_a_shard_is_its_fragments_and_an_end_of_archive(packed: SimpleNamespace)
     assert info.bytes == packed.layout.size_bytes
 
 
+def test_a_release_is_unfinished_from_the_first_shard_that_is_written_again(packed: SimpleNamespace) -> None:
+    packed.path.parent.mkdir()
+    (packed.path.parent / "dataset.json").write_bytes(b"of an earlier release")
+    write_shard(packed.path, packed.layout, packed.paths.__getitem__)
+    assert [path.name for path in packed.path.parent.iterdir()] == [packed.path.name]
+
+
 @reads_with_webdataset
 def test_stock_webdataset_reads_every_clip_with_its_dtypes_and_shapes(
     packed: SimpleNamespace, clips: tuple[Clip, ...]
