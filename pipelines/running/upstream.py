@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from pipelines.running.folder import (
     PENDING_FILE,
@@ -23,7 +22,7 @@ class UpstreamMissing(ConfigError):
     """An upstream stage has not come as far as it must: nothing is wrong with the request but its time."""
 
 
-def upstream_records(config: Any) -> dict[str, StageRecord]:
+def upstream_records(config: object) -> dict[str, StageRecord]:
     """Records of the stages a config takes its inputs from, by the field that names the folder."""
     records = {name: read_stage_record(Path(getattr(config, name))) for name in input_fields(config)}
     return {name: record for name, record in records.items() if record is not None}

@@ -195,9 +195,9 @@ def _encode(
         yield _written(one, fragment, _quality(one, pair, codec, config), out)
 
 
-def _written(one: _Prepared, fragment: Fragment, quality: dict[str, Any] | None, out: Path) -> Outcome:
+def _written(one: _Prepared, fragment: Fragment, quality: dict[str, object] | None, out: Path) -> Outcome:
     path = write_fragment(clips_folder(out), fragment)
-    facts: dict[str, Any] = {
+    facts: dict[str, object] = {
         "frames": one.record.frame_count,
         "bytes": fragment.info.size_bytes,
         "source_digest": one.record.content_digest,
@@ -213,7 +213,7 @@ def _written(one: _Prepared, fragment: Fragment, quality: dict[str, Any] | None,
 
 def _quality(
     one: _Prepared, latents: tuple[Float32Array, Float32Array], codec: VideoCodec, config: EncodeConfig
-) -> dict[str, Any] | None:
+) -> dict[str, object] | None:
     rank = int(sha256_bytes(one.unit.id.encode())[:8], 16) / 16**8
     return measure_quality(one.videos, latents, codec, config.clip).to_json() if rank < config.quality_share else None
 

@@ -5,7 +5,6 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from pipelines.artifacts.episode_table import EPISODES_FILE, record_digest, row_from_json, write_episodes
 from pipelines.artifacts.layout import conventions_path, records_path, surface_path
@@ -143,7 +142,7 @@ def _write_surface(
     return voxels_digest(voxels), None
 
 
-def _row(record: EpisodeRecord) -> dict[str, Any]:
+def _row(record: EpisodeRecord) -> dict[str, object]:
     return {
         "id": record.id.text,
         "container": record.container,
@@ -158,7 +157,7 @@ def _finish(config: IndexConfig, context: StageContext, settled: Settled) -> Fin
     """Write the table of trajectories; of those found twice the first container's stays, the others are refused."""
     dataset = load_dataset(config.dataset)
     write_conventions(context.out, dataset)
-    first: dict[str, Mapping[str, Any]] = {}
+    first: dict[str, Mapping[str, object]] = {}
     refusals = []
     for container, outcome in sorted(settled.outcomes.items()):
         for row in outcome.facts.get("episodes", ()) if outcome.state == DONE else ():
@@ -198,11 +197,11 @@ def count_differences(found: Mapping[str, int], expected: Mapping[str, int]) -> 
     ]
 
 
-def _duplicate(container: str, row: Mapping[str, Any], kept: Mapping[str, Any]) -> Refusal:
+def _duplicate(container: str, row: Mapping[str, object], kept: Mapping[str, object]) -> Refusal:
     same = row["digest"] == kept["digest"]
     content = "the same content" if same else "other content"
     return Refusal(
-        unit=row["id"],
+        unit=str(row["id"]),
         source=container,
         reason=Reason.EPISODE_DUPLICATE,
         message=f"{row['id']} stands in {kept['container']} too, with {content}; the one in {container} is left out: "

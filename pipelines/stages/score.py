@@ -1,17 +1,15 @@
 """`wsm score`: how hard every clip of a release is, one number for each thing that may make it so."""
 
-import hashlib
-import logging
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 
-import fsspec
 import numpy as np
 import pyarrow as pa
 
+from pipelines.artifacts.release_files import content_digest, copy_into_release
 from pipelines.running.stage import Finished, Outcome, Settled, Stage, StageContext, Unit
 from wsm_data.access.release import Release, open_release, read_manifest
 from wsm_data.codecs.base import VideoCodec
@@ -20,15 +18,13 @@ from wsm_data.curation.path_outline import Outlines
 from wsm_data.curation.rollouts import ROLLOUT_SCORES, read_rollouts, rollout_scores
 from wsm_data.curation.score_clip import CLIP_SCORES, ClipScores, score_clip
 from wsm_data.curation.scores_table import SCORES_VERSION, ScoreTable, read_paths, read_scores, write_scores
-from wsm_data.errors import ConfigError, IntegrityError
-from wsm_data.files.atomic import write_bytes
+from wsm_data.errors import IntegrityError
 from wsm_data.files.digest import digest_json, sha256_file
 from wsm_data.files.stores import open_store
 from wsm_data.files.typed_toml import INPUT, SELECTION
 from wsm_data.shards.manifest import release_digest
 from wsm_data.shards.names import SCORES_NAME
 
-_LOG = logging.getLogger(__name__)
 _PARTS = "parts"
 
 
@@ -150,33 +146,18 @@ def _installed(path: Path, config: ScoreConfig, out: Path) -> tuple[str, ...]:
     """Copy the scores into a local release; returns the name of the copy, relative to the folder of the stage."""
     if not config.install:
         return ()
-    if "://" in config.release:
-        _LOG.warning("%s is not copied to %s: put it there as %s", path, config.release, SCORES_NAME)
-        return ()
-    copy = Path(config.release) / SCORES_NAME
-    data = path.read_bytes()
-    if not (copy.is_file() and copy.read_bytes() == data):
-        try:
-            write_bytes(copy, data)
-        except PermissionError as error:
-            _LOG.warning("%s cannot be copied into its release (%s); name it with --set scores=PATH", path, error)
-            return ()
-    return (os.path.relpath(copy, out),)
+    copy = copy_into_release(path, config.release, SCORES_NAME, "name it with --set scores=PATH")
+    return (os.path.relpath(copy, out),) if copy else ()
 
 
 def _finish_inputs(config: ScoreConfig) -> Mapping[str, str]:
     """What only the finished table depends on: which release it is, and the rollouts."""
     manifest = read_manifest(open_store(config.release))
     inputs = {"release": release_digest(manifest), "install": str(config.install)}
-    return inputs | ({"rollouts": _sha256(config.rollouts)} if config.rollouts else {})
-
-
-def _sha256(location: str) -> str:
-    try:
-        with fsspec.open(location, "rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
-    except FileNotFoundError as error:
-        raise ConfigError(f"there are no rollouts at {location}; evaluate a policy on this release first") from error
+    if not config.rollouts:
+        return inputs
+    missing = f"there are no rollouts at {config.rollouts}; evaluate a policy on this release first"
+    return {**inputs, "rollouts": content_digest(config.rollouts, missing)}
 
 
 def _part_path(out: Path, shard: str) -> Path:

@@ -6,18 +6,16 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
-import fsspec
 import pyarrow as pa
-import xxhash
 
+from pipelines.artifacts.release_files import content_digest, copy_into_release
 from pipelines.running.command_text import command_text
 from pipelines.running.settings import differences, settings_of
 from pipelines.running.stage import Outcome, Stage, StageContext, Unit
 from wsm_data.access.release import Release, open_release, read_manifest
 from wsm_data.curation.scores_table import ScoreTable, read_paths, read_scorers, read_scores
 from wsm_data.curation.select import INDEX_COLUMNS, ChosenClips, SelectionConfig, select_clips
-from wsm_data.errors import ConfigError, IntegrityError
-from wsm_data.files.atomic import write_bytes
+from wsm_data.errors import IntegrityError
 from wsm_data.files.digest import sha256_file
 from wsm_data.files.stores import open_store
 from wsm_data.files.typed_toml import INPUT
@@ -34,7 +32,6 @@ from wsm_data.shards.selection import (
 
 _LOG = logging.getLogger(__name__)
 _UNIT = "selection"
-_READ_BYTES = 4 << 20
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,22 +102,16 @@ def install_selection(path: Path, config: SelectConfig) -> None:
 
     Where one of other settings stands there under its name, it is replaced, and that is announced.
     """
-    if "://" in config.release:
-        _LOG.warning("%s is not copied to %s: put it at %s there", path, config.release, selection_path(config.name))
-        return
-    data, installed = path.read_bytes(), Path(config.release) / selection_path(config.name)
-    if installed.is_file():
-        old = installed.read_bytes()
-        if old == data:
-            return
-        _announce_replacement(installed, old, data)
-    try:
-        write_bytes(installed, data)
-    except PermissionError as error:
-        _LOG.warning("%s cannot be copied into its release (%s); name it by its path", path, error)
+    name = selection_path(config.name)
+    installed = Path(config.release) / name
+    old = installed.read_bytes() if installed.is_file() else b""  # behind a URL there is none
+    if copy_into_release(path, config.release, name, "name it by its path") and old:
+        _announce_replacement(installed, old, path.read_bytes())
 
 
 def _announce_replacement(installed: Path, old: bytes, new: bytes) -> None:
+    if old == new:
+        return
     try:
         before = parse_selection(old, str(installed)).rule.get("settings", {})
     except IntegrityError as error:
@@ -170,15 +161,8 @@ def _rule(config: SelectConfig, scores: ScoreTable, chosen: ChosenClips, scores_
 
 
 def _scores_digest(location: str) -> str:
-    """xxh3_128 of the file, in hexadecimal, by which scores are told apart; parquet's checksums vouch for its pages."""
-    digest = xxhash.xxh3_128()
-    try:
-        with fsspec.open(location, "rb") as file:
-            while block := file.read(_READ_BYTES):
-                digest.update(block)
-    except FileNotFoundError as error:
-        raise ConfigError(f"there are no scores at {location}; run `wsm score RELEASE` first") from error
-    return str(digest.hexdigest())
+    """Scores are told apart by their bytes; parquet's checksums vouch for its pages."""
+    return content_digest(location, f"there are no scores at {location}; run `wsm score RELEASE` first")
 
 
 STAGE = Stage(name="select", version=2, config_type=SelectConfig, list_units=_list_units, process=_process)

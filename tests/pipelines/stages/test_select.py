@@ -193,4 +193,4 @@ def test_a_selection_that_was_removed_from_its_release_is_put_back(select, relea
 def test_behind_a_url_nothing_is_installed_and_the_user_is_told(select, caplog):
     _, path = select()
     install_selection(path, SelectConfig(release="memory://release"))
-    assert "is not copied to memory://release: put it at selections/hard.parquet there" in caplog.text
+    assert "is not copied to memory://release: put it there as selections/hard.parquet" in caplog.text
