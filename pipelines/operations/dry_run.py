@@ -20,7 +20,7 @@ _SHOWN_UNITS = 20
 
 def show_stage(stage: Stage[ConfigT], config: ConfigT, out: Path, options: RunOptions) -> None:
     """Print the settings of one stage and what it would do."""
-    _show_settings(stage.name, config)
+    _show_settings(stage, config)
     report = run_stage(stage, config, out, options)
     _show_units(report)
     typer.echo(summary_table([report]))
@@ -39,7 +39,7 @@ def show_run(configs: Mapping[str, object], out: Path, first: RunOptions, others
         ConfigError: a stage could not begin, although those before it have nothing to do.
     """
     for name, config in configs.items():
-        _show_settings(name, config)
+        _show_settings(load_stage(name), config)
     reports: list[StageReport] = []
     waiting = False  # whether a stage before has something to do, so that what follows from it is not known yet
     for name, config in configs.items():
@@ -75,8 +75,11 @@ def _awaits_input(config: object, stages: Iterable[str], out: Path) -> bool:
     return False
 
 
-def _show_settings(name: str, config: object) -> None:
-    typer.echo(f"{name}: settings\n{json.dumps(config_json(config), indent=2)}")
+def _show_settings(stage: Stage[ConfigT], config: ConfigT) -> None:
+    typer.echo(f"{stage.name}: settings\n{json.dumps(config_json(config), indent=2)}")
+    if stage.conventions is not None:
+        said = config_json(stage.conventions(config))
+        typer.echo(f"{stage.name}: conventions of the source\n{json.dumps(said, indent=2)}")
 
 
 def _show_units(report: StageReport) -> None:

@@ -112,6 +112,8 @@ class Stage(Generic[ConfigT]):
             parts are judged; empty where a unit is one piece.
         finish_inputs: digest of each input that `finish` alone reads, by name; a changed one has it called again
             although no unit is redone. None where there is none.
+        conventions: what decides the outputs and stands in a file that a setting names; a dry run prints it beside the
+            settings. None where there is no such file.
     """
 
     name: str
@@ -122,6 +124,7 @@ class Stage(Generic[ConfigT]):
     finish: Callable[[ConfigT, StageContext, Settled], Finished] | None = None
     parts_fact: str = ""
     finish_inputs: Callable[[ConfigT], Mapping[str, str]] | None = None
+    conventions: Callable[[ConfigT], object] | None = None
 
 
 AnyStage: TypeAlias = Stage[Any]

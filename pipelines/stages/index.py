@@ -219,4 +219,5 @@ STAGE = Stage(
     finish=_finish,
     parts_fact="trajectories",
     finish_inputs=_finish_inputs,
+    conventions=lambda config: load_dataset(config.dataset),
 )

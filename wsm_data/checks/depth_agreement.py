@@ -7,7 +7,6 @@ camera stood still, or moved the other way; and against each other meaning of th
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -28,27 +27,17 @@ _HALF_TURN = np.diag([-1.0, 1.0, -1.0, 1.0])
 _STORED_AXES: Mapping[str, Float64Array] = {**T_STORED_OPENCV, "body (x forward, y left, z up)": _T_BODY_OPENCV}
 
 
-@dataclass(frozen=True, kw_only=True)
-class DepthAgreementConfig:
-    """How agreement is measured.
+MAX_POINTS = 1600
+"""So many pixels of a frame are compared at most."""
 
-    With exact depth a right pose errs by the rounding of the depth, 1e-4; wrong axes err by twice the motion, 4 % for
-    0.06 m at 3 m (on the real files 0.03 mm against 270 to 820 mm: manifests/datasets/interndata_n1.toml, camera_axes).
+MIN_POINTS = 50
+"""A pair counts from so many points that can tell,"""
 
-    Attributes:
-        max_median_error: accepted median of |predicted depth / depth there - 1|. A point can tell two motions apart
-            when its errors under them differ by more than this.
-        max_points: so many pixels of a frame are compared at most.
-        min_points: a pair counts from so many points that can tell,
-        min_share: and from this share of the points that both frames see: fewer lie at edges and behind corners.
-        max_offset_frames: poses up to so many frames earlier and later are held against the images too.
-    """
+MIN_SHARE = 0.02
+"""and from this share of the points that both frames see: fewer lie at edges and behind corners."""
 
-    max_median_error: float = 0.02
-    max_points: int = 1600
-    min_points: int = 50
-    min_share: float = 0.02
-    max_offset_frames: int = 3
+MAX_OFFSET_FRAMES = 3
+"""Poses up to so many frames earlier and later are held against the images too."""
 
 
 def check_depth_agreement(
@@ -56,7 +45,7 @@ def check_depth_agreement(
     depth_m: Mapping[int, Float32Array],
     pairs: Sequence[tuple[int, int]],
     camera_axes: str,
-    config: DepthAgreementConfig | None = None,
+    max_error: float,
 ) -> Verdict:
     """Refuse a trajectory whose depth contradicts its poses (`pose.depth_disagree`).
 
@@ -74,22 +63,21 @@ def check_depth_agreement(
             measurement; float32 [H, W].
         pairs: frames that are compared, each of them in `depth_m`. About half a metre apart they tell most.
         camera_axes: the axes the source's manifest says its poses are stored in, `opengl` or `opencv`.
-        config: limits.
+        max_error: accepted median of |predicted depth / depth there - 1|. A point can tell two motions apart when its
+            errors under them differ by more than this. On the real files right axes err by 0.03 mm, wrong ones by 270
+            to 820 mm: manifests/datasets/interndata_n1.toml, camera_axes.
     """
-    config = config or DepthAgreementConfig()
-    compared = [depth_pair(a, b, depth_m, record.intrinsics, config.max_points) for a, b in pairs]
+    compared = [depth_pair(a, b, depth_m, record.intrinsics, MAX_POINTS) for a, b in pairs]
     own = [_errors(record, record.T_world_camera, pair) for pair in compared]
-    median, used = _median_error(record, compared, own, config)
+    median, used = _median_error(record, compared, own, max_error)
     meanings = _meanings(record.T_world_camera @ invert(T_STORED_OPENCV[camera_axes]))
-    meanings |= _shifted(record.T_world_camera, config.max_offset_frames)
-    errors = {name: _against(record, poses, compared, own, config) for name, poses in meanings.items()}
+    meanings |= _shifted(record.T_world_camera)
+    errors = {name: _against(record, poses, compared, own, max_error) for name, poses in meanings.items()}
     better = {
-        name: other
-        for name, (mine, other) in errors.items()
-        if mine > config.max_median_error and other <= min(config.max_median_error, mine / 2)
+        name: other for name, (mine, other) in errors.items() if mine > max_error and other <= min(max_error, mine / 2)
     }
     measured: dict[str, object] = {"pairs": used, "median_relative_error": median}
-    if not better and (median is None or median <= config.max_median_error):
+    if not better and (median is None or median <= max_error):
         return Verdict(measured=measured)
     fits = min(better, key=lambda name: better[name], default=None)
     advice = (
@@ -99,7 +87,7 @@ def check_depth_agreement(
     )
     found = f"{median:.1%} in {used} pairs of frames" if median is not None else "that another meaning fits better"
     message = (
-        f"{record.id.text}: depth moved along the poses must agree within {config.max_median_error:.0%}, found {found} "
+        f"{record.id.text}: depth moved along the poses must agree within {max_error:.0%}, found {found} "
         f"with poses stored as {camera_axes}; {advice}"
     )
     tried = {name: {"own": mine, "other": other} for name, (mine, other) in errors.items() if math.isfinite(other)}
@@ -115,10 +103,10 @@ def _meanings(T_world_stored: Float64Array) -> dict[str, Float64Array]:
     return plain | turned | {f"world to camera, {name}": inverse @ T for name, T in _STORED_AXES.items()}
 
 
-def _shifted(T_world_camera: Float64Array, max_offset_frames: int) -> dict[str, Float64Array]:
+def _shifted(T_world_camera: Float64Array) -> dict[str, Float64Array]:
     """Poses out of step: the image of frame t has the pose of a frame before or after it; NaN where there is none."""
     shifted = {}
-    for n in range(1, max_offset_frames + 1):
+    for n in range(1, MAX_OFFSET_FRAMES + 1):
         frames = "1 frame" if n == 1 else f"{n} frames"
         missing = np.full((min(n, len(T_world_camera)), 4, 4), np.nan)
         shifted[f"those of {frames} later"] = np.concatenate([T_world_camera[n:], missing])
@@ -132,7 +120,7 @@ def _errors(record: EpisodeRecord, T_world_camera: Float64Array, pair: DepthPair
 
 
 def _median_error(
-    record: EpisodeRecord, pairs: Sequence[DepthPair], own: Sequence[Float64Array], config: DepthAgreementConfig
+    record: EpisodeRecord, pairs: Sequence[DepthPair], own: Sequence[Float64Array], max_error: float
 ) -> tuple[float | None, int]:
     """Median error over the points that can tell, of all pairs with enough of them, and the number of such pairs."""
     told = []
@@ -140,8 +128,8 @@ def _median_error(
         T_b_a = invert(record.T_world_camera[pair.b]) @ record.T_world_camera[pair.a]
         still = relative_errors(pair, np.eye(4), record.intrinsics)
         back = relative_errors(pair, _HALF_TURN @ T_b_a @ _HALF_TURN, record.intrinsics)
-        tells = _differ(mine, still, config) | _differ(mine, back, config)
-        if _enough(tells, mine, config):
+        tells = _differ(mine, still, max_error) | _differ(mine, back, max_error)
+        if _enough(tells, mine):
             told.append(np.abs(mine[tells]))
     return (float(np.median(np.concatenate(told))) if told else None), len(told)
 
@@ -151,14 +139,14 @@ def _against(
     T_world_camera: Float64Array,
     pairs: Sequence[DepthPair],
     own: Sequence[Float64Array],
-    config: DepthAgreementConfig,
+    max_error: float,
 ) -> tuple[float, float]:
     """Median errors of a record's own poses and of others, over the points that tell them apart; NaN without any."""
     told = []
     for pair, mine in zip(pairs, own, strict=True):
         other = _errors(record, T_world_camera, pair)
-        tells = _differ(mine, other, config)
-        if _enough(tells, mine, config):
+        tells = _differ(mine, other, max_error)
+        if _enough(tells, mine):
             told.append(np.abs([mine[tells], other[tells]]))
     if not told:
         return math.nan, math.nan
@@ -166,11 +154,11 @@ def _against(
     return mine_median, other_median
 
 
-def _differ(one: Float64Array, other: Float64Array, config: DepthAgreementConfig) -> BoolArray:
+def _differ(one: Float64Array, other: Float64Array, max_error: float) -> BoolArray:
     """Points that both motions show, with errors further apart than the limit."""
-    return np.abs(one - other) > config.max_median_error  # NaN, where one does not show it, is not greater
+    return np.abs(one - other) > max_error  # NaN, where one does not show it, is not greater
 
 
-def _enough(tells: BoolArray, errors: Float64Array, config: DepthAgreementConfig) -> bool:
+def _enough(tells: BoolArray, errors: Float64Array) -> bool:
     count = np.count_nonzero(tells)
-    return bool(count >= max(config.min_points, config.min_share * np.count_nonzero(np.isfinite(errors))))
+    return bool(count >= max(MIN_POINTS, MIN_SHARE * np.count_nonzero(np.isfinite(errors))))

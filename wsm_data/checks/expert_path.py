@@ -6,13 +6,8 @@ from wsm_data.errors import Reason
 from wsm_data.schema.arrays import Float64Array
 from wsm_data.schema.verdict import Verdict
 
-MIN_CLEARANCE_M = 0.10
-"""Nearest an expert's camera may come to an obstacle, m. The smallest clearance measured in the source is 0.21 m, and a
-map of 0.05 m cells misplaces path and obstacle by up to half a cell's diagonal each, 0.035 m. So a sound path keeps
-0.14 m on the map; under 0.10 m the path, the map or their alignment is wrong."""
 
-
-def check_expert_path(clearance_m: Float64Array, where: str, min_clearance_m: float = MIN_CLEARANCE_M) -> Verdict:
+def check_expert_path(clearance_m: Float64Array, where: str, min_clearance_m: float) -> Verdict:
     """Refuse a path that leads through or along an obstacle (`path.through_obstacle`).
 
     Args:

@@ -1,64 +1,46 @@
 """Do the intrinsics belong to the images?"""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
 from wsm_data.checks.limits import verdict_within
 from wsm_data.errors import Reason
 from wsm_data.schema.camera import Intrinsics
+from wsm_data.schema.check_limits import CheckLimits
 from wsm_data.schema.dataset import CameraModel
 from wsm_data.schema.episode import EpisodeRecord
 from wsm_data.schema.verdict import Verdict
 
+MIN_FIELD_OF_VIEW_DEG = 30.0
+"""Narrowest horizontal field of view of a camera that sees where it drives, degrees."""
 
-@dataclass(frozen=True, kw_only=True)
-class IntrinsicsFitConfig:
-    """What a plausible camera is.
-
-    Attributes:
-        max_centre_offset: distance of the principal point from the image centre, as a share of the side. Intrinsics of
-            another image size are off by at least an eighth (640 against 480 px: 0.17).
-        min_field_of_view_deg: narrowest horizontal field of view, degrees.
-        max_field_of_view_deg: widest, degrees: beyond it a pinhole image is hardly usable.
-        max_aspect_error: |fx / fy - 1|; the published d435i has 0.012.
-        max_published_error: relative deviation from the published focal lengths, and of the principal point as a share
-            of the side, where the image size is the published one.
-    """
-
-    max_centre_offset: float = 0.1
-    min_field_of_view_deg: float = 30.0
-    max_field_of_view_deg: float = 130.0
-    max_aspect_error: float = 0.05
-    max_published_error: float = 0.03
+MAX_ASPECT_ERROR = 0.05
+"""Largest |fx / fy - 1|; the published d435i has 0.012."""
 
 
-def check_intrinsics_fit(
-    record: EpisodeRecord, cameras: Mapping[str, CameraModel], config: IntrinsicsFitConfig | None = None
-) -> Verdict:
+def check_intrinsics_fit(record: EpisodeRecord, cameras: Mapping[str, CameraModel], checks: CheckLimits) -> Verdict:
     """Refuse intrinsics that cannot belong to the images, or are not the published camera's (`intrinsics.misfit`).
 
     Args:
         record: the trajectory.
         cameras: published camera models by camera name.
-        config: limits.
+        checks: limits of the source.
     """
-    config = config or IntrinsicsFitConfig()
     intrinsics = record.intrinsics
     limits = {
-        "centre_offset": (_centre_offset(intrinsics), 0.0, config.max_centre_offset),
+        "centre_offset": (_centre_offset(intrinsics), 0.0, checks.max_centre_offset),
         "field_of_view_deg": (
             float(np.rad2deg(2 * np.arctan2(intrinsics.width / 2, intrinsics.fx))),
-            config.min_field_of_view_deg,
-            config.max_field_of_view_deg,
+            MIN_FIELD_OF_VIEW_DEG,
+            checks.max_field_of_view_deg,
         ),
-        "aspect_error": (abs(intrinsics.fx / intrinsics.fy - 1), 0.0, config.max_aspect_error),
+        "aspect_error": (abs(intrinsics.fx / intrinsics.fy - 1), 0.0, MAX_ASPECT_ERROR),
     }
     published = cameras.get(record.id.camera)
     if published is not None and (published.width, published.height) == (intrinsics.width, intrinsics.height):
         error = _published_error(intrinsics, published)
-        limits["published_error"] = (error, 0.0, config.max_published_error)
+        limits["published_error"] = (error, 0.0, checks.max_published_error)
     return verdict_within(limits, Reason.INTRINSICS_MISFIT, f"{record.id.text}: {intrinsics} does not fit the images")
 
 

@@ -1,7 +1,5 @@
 """Does the camera stand on the robot as its mount says?"""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from wsm_data.checks.limits import verdict_within
@@ -12,33 +10,17 @@ from wsm_data.schema.episode import EpisodeRecord
 from wsm_data.schema.verdict import Verdict
 
 
-@dataclass(frozen=True, kw_only=True)
-class MountConfig:
-    """What a mount may be, beside the manifest's greatest height and pitch.
-
-    Attributes:
-        min_height_m: lowest camera, m.
-        max_pitch_up_deg: a level mount may point up by so much, degrees: calibration, not intent.
-        max_disagreement_deg: between the mount's pitch and that of any pose, degrees; the robot drives on flat floors.
-        max_roll_deg: of any pose, degrees. Poses in the wrong camera axes are upside down.
-    """
-
-    min_height_m: float = 0.05
-    max_pitch_up_deg: float = 2.0
-    max_disagreement_deg: float = 3.0
-    max_roll_deg: float = 5.0
-
-
-def check_mount(record: EpisodeRecord, dataset: DatasetManifest, config: MountConfig | None = None) -> Verdict:
+def check_mount(record: EpisodeRecord, dataset: DatasetManifest) -> Verdict:
     """Refuse a mount outside its limits, or poses that are not those of a camera mounted so (`mount.misfit`)."""
-    config = config or MountConfig()
+    checks = dataset.checks
     pitch_deg, roll_deg = _pitch_and_roll_deg(record.T_world_camera)
     mount_pitch_deg = float(np.rad2deg(record.camera_pitch_rad))
+    disagreement_deg = float(np.abs(pitch_deg - mount_pitch_deg).max())
     limits = {
-        "camera_height_m": (record.camera_height_m, config.min_height_m, dataset.max_camera_height_m),
-        "mount_pitch_deg": (mount_pitch_deg, -config.max_pitch_up_deg, dataset.max_pitch_deg),
-        "pitch_disagreement_deg": (float(np.abs(pitch_deg - mount_pitch_deg).max()), 0.0, config.max_disagreement_deg),
-        "roll_deg": (float(np.abs(roll_deg).max()), 0.0, config.max_roll_deg),
+        "camera_height_m": (record.camera_height_m, checks.min_camera_height_m, dataset.max_camera_height_m),
+        "mount_pitch_deg": (mount_pitch_deg, -checks.max_pitch_up_deg, dataset.max_pitch_deg),
+        "pitch_disagreement_deg": (disagreement_deg, 0.0, checks.max_pitch_disagreement_deg),
+        "roll_deg": (float(np.abs(roll_deg).max()), 0.0, checks.max_roll_deg),
     }
     return verdict_within(limits, Reason.MOUNT_MISFIT, f"{record.id.text}: the camera does not stand as its mount says")
 

@@ -12,9 +12,9 @@ from wsm_data.schema.verdict import Verdict
 
 RECORD_CHECKS: tuple[Callable[[EpisodeRecord, DatasetManifest], Verdict], ...] = (
     lambda record, dataset: check_length(record, dataset.min_frames),
-    lambda record, dataset: check_intrinsics_fit(record, dataset.cameras),
-    lambda record, dataset: check_mount(record, dataset),
-    lambda record, _dataset: check_pose_jump(record),
+    lambda record, dataset: check_intrinsics_fit(record, dataset.cameras, dataset.checks),
+    check_mount,
+    lambda record, dataset: check_pose_jump(record, dataset.checks),
 )
 
 

@@ -42,7 +42,7 @@ def require_depth_agreement(record: EpisodeRecord, frames: EpisodeFrames, datase
     measured = {number: image for number, image in enumerate(frames.depth) if image is not None}
     pairs = spread_pairs(record, sorted(measured))
     depth_m = {number: _depth_m(record, number, measured[number], dataset) for number in sorted({*chain(*pairs)})}
-    require_kept(check_depth_agreement(record, depth_m, pairs, dataset.camera_axes))
+    require_kept(check_depth_agreement(record, depth_m, pairs, dataset.camera_axes, dataset.checks.max_depth_error))
 
 
 def agreeing_records(
@@ -79,7 +79,7 @@ def _samples_verdict(record: EpisodeRecord, samples: Mapping[int, DepthFrame], d
         except DataError:
             continue
     whole = [(a, b) for a, b in pairs if a in depth_m and b in depth_m]
-    return check_depth_agreement(record, depth_m, whole, dataset.camera_axes)
+    return check_depth_agreement(record, depth_m, whole, dataset.camera_axes, dataset.checks.max_depth_error)
 
 
 def spread_pairs(record: EpisodeRecord, numbers: Sequence[int]) -> list[tuple[int, int]]:

@@ -53,7 +53,7 @@ def view_scene(record: EpisodeRecord, scene_map: SceneMap, dataset: DatasetManif
     floor = _around_path(floor, path_xy_m, config.map_margin_m, record.id.text)
     floor, filled = fill_holes(floor, config.fill_holes_cells)
     floor, freed = free_swept_cells(floor, path_xy_m, radius_m)
-    require_kept(check_expert_path(clearance_m(floor, path_xy_m), record.id.text))
+    require_kept(check_expert_path(clearance_m(floor, path_xy_m), record.id.text, dataset.checks.min_path_clearance_m))
     geodesic_m = geodesic_distance(floor, path_xy_m[-1], radius_m, config.goal_radius_m)
     distance_m = sample_distance(geodesic_m, floor, path_xy_m)
     require_kept(check_goal_reachable(distance_m, record.id.text))

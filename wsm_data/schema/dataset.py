@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from wsm_data.schema.check_limits import CheckLimits
 from wsm_data.schema.depth import DepthEncoding
 
 
@@ -71,6 +72,7 @@ class DatasetManifest:
         cameras: published camera models by camera name (the last word of a group).
         max_camera_height_m: mounts above this are taken for damage, m.
         max_pitch_deg: mounts pitched down by more are taken for damage, degrees.
+        checks: the other limits beyond which a trajectory is refused.
         min_frames: shorter trajectories are refused.
         expected_episodes: published number of episodes by group, to compare with what is found.
     """
@@ -86,6 +88,7 @@ class DatasetManifest:
     cameras: Mapping[str, CameraModel] = field(default_factory=dict)
     max_camera_height_m: float = 2.0
     max_pitch_deg: float = 45.0
+    checks: CheckLimits = field(default_factory=CheckLimits)
     min_frames: int = 5
     expected_episodes: Mapping[str, int] = field(default_factory=dict)
 

@@ -107,7 +107,7 @@ def other(old):
         case int():
             return old + 1
         case float():
-            return old / 2 + 0.01
+            return old / 2 + 0.013
         case tuple():
             return (*old[:-1], other(old[-1]))
         case dict():

@@ -20,8 +20,11 @@ from box_room import (
 from pipelines.artifacts.episode_table import read_episodes
 from pipelines.artifacts.layout import records_path, surface_path
 from pipelines.artifacts.source import container_from_json
+from pipelines.operations.dry_run import show_stage
 from pipelines.running.folder import read_stage_record
+from pipelines.running.options import RunOptions
 from pipelines.running.settings import settings_of
+from pipelines.stages import index
 from pipelines.stages.index import IndexConfig, count_differences
 from wsm_data.errors import ConfigError
 from wsm_data.files.jsonlines import read_lines
@@ -75,6 +78,18 @@ def test_where_the_source_and_its_manifest_lie_is_no_setting():
 def test_a_sampling_that_takes_no_frame_is_refused(every):
     with pytest.raises(ConfigError, match=f"depth_sample_every must be at least 1, found {every}"):
         build_config(IndexConfig, {"source": "s", "depth_sample_every": every})
+
+
+def test_a_dry_run_shows_what_the_manifest_says_its_defaults_included(make_pipeline, tmp_path, capsys):
+    pipeline = make_pipeline()
+    pipeline.set_manifest(f"{MANIFEST_TOML}\n[checks]\nmax_roll_deg = 12.5\n")
+    config = IndexConfig(source=pipeline.source, dataset=str(pipeline.root / "rooms.toml"))
+    show_stage(index.STAGE, config, tmp_path / "dry", RunOptions(dry_run=True, quiet=True))
+    said = capsys.readouterr().out
+    assert "index: conventions of the source" in said
+    for line in ('"max_roll_deg": 12.5', '"max_pitch_up_deg": 2.0', '"reader": "interndata"'):
+        assert line in said
+    assert not (tmp_path / "dry").exists()
 
 
 # what is written

@@ -1,8 +1,11 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from wsm_data.checks.mount import check_mount
 from wsm_data.errors import Reason
+from wsm_data.schema.check_limits import CheckLimits
 
 
 @pytest.mark.parametrize("pitch_deg", [0.0, 12.0, 30.0])
@@ -44,3 +47,17 @@ def test_a_rolled_camera_is_refused_with_its_angle(make_record, dataset):
     )
     assert verdict.reason is Reason.MOUNT_MISFIT
     assert verdict.measured["roll_deg"] == pytest.approx(8)
+
+
+@pytest.mark.parametrize(
+    ("fields", "limits"),
+    [
+        ({"height_m": 0.0}, {"min_camera_height_m": 0.0}),
+        ({"pitch_deg": -20.0}, {"max_pitch_up_deg": 21.0}),
+        ({"pitch_deg": 10.0, "camera_pitch_rad": np.deg2rad(20)}, {"max_pitch_disagreement_deg": 11.0}),
+    ],
+)
+def test_another_robot_has_its_limits_in_the_manifest(make_record, dataset, fields, limits):
+    record = make_record(**fields)
+    assert not check_mount(record, dataset).keep
+    assert check_mount(record, replace(dataset, checks=CheckLimits(**limits))).keep

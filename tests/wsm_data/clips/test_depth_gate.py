@@ -10,6 +10,7 @@ from wsm_data.clips.depth_gate import MAX_PAIRS, SPACING_M, agreeing_records, re
 from wsm_data.errors import DataError, Reason
 from wsm_data.geometry.camera import T_OPENGL_OPENCV
 from wsm_data.geometry.transform import invert
+from wsm_data.schema.check_limits import CheckLimits
 from wsm_data.schema.identity import EpisodeId
 
 DRIVE = along_x()
@@ -36,6 +37,22 @@ def refusal(record, frames=FRAMES, dataset=DATASET):
 
 def test_depth_that_fits_its_poses_is_let_through():
     require_depth_agreement(record_of(DRIVE), FRAMES, DATASET)
+
+
+def test_how_far_depth_may_err_is_the_manifests():
+    """Frames 2 and 6 of the pairs 0-2, 2-4, 4-6 tell of distances that are 4 % too long."""
+    raw = raw_depth(DRIVE)
+    raw[[2, 6]] = np.rint(raw[[2, 6]] * 1.04)
+    frames = replace(FRAMES, depth=tuple(encoded(".png", image) for image in raw))
+    assert refusal(record_of(DRIVE), frames).reason is Reason.POSE_DEPTH_DISAGREE
+    noisy = replace(DATASET, checks=CheckLimits(max_depth_error=0.1))
+    require_depth_agreement(record_of(DRIVE), frames, noisy)
+
+
+def test_frames_without_depth_are_left_out_of_the_pairs():
+    wrong = record_of(DRIVE, T_world_camera=DRIVE.T_world_camera @ T_OPENGL_OPENCV)
+    assert refusal(wrong, with_depth(FRAMES, frame_2=None, frame_4=None)).reason is Reason.POSE_DEPTH_DISAGREE
+    require_depth_agreement(wrong, replace(FRAMES, depth=(None,) * len(FRAMES.rgb)), DATASET)
 
 
 def test_poses_that_were_stored_in_other_axes_are_refused_and_the_fitting_ones_named():

@@ -14,6 +14,7 @@ from wsm_data.maps.geodesic import geodesic_distance
 from wsm_data.maps.occupancy import occupancy_for
 from wsm_data.maps.scene_map import MAX_MAP_CELLS, build_scene_map, floor_levels
 from wsm_data.maps.voxels import voxels_from_cloud
+from wsm_data.schema.check_limits import CheckLimits
 from wsm_data.schema.occupancy import FREE, OCCUPIED, UNKNOWN
 from wsm_data.schema.point_cloud import PointCloud
 
@@ -183,6 +184,14 @@ def test_furniture_on_another_floor_is_not_in_the_way():
 
 
 # refusals
+
+
+def test_how_near_a_path_may_come_to_obstacles_is_the_manifests():
+    """The hall is 3 m wide: no path keeps 1.6 m from both of its walls."""
+    drive = along_x()
+    strict = replace(DATASET, checks=CheckLimits(min_path_clearance_m=1.6))
+    with pytest.raises(DataError, match=r"must keep 1\.60 m from obstacles"):
+        view_scene(record_of(drive), scene_map([HALL], [drive]), strict, CONFIG)
 
 
 def test_a_path_through_an_obstacle_is_refused_with_the_nearest_frame_and_its_clearance():

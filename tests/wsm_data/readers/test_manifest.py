@@ -47,6 +47,11 @@ def test_a_manifest_of_ones_own_is_loaded_by_path(tmp_path):
     assert load_dataset(str(tmp_path / "mine.toml")) == dataset
 
 
+def test_limits_of_the_checks_are_differences_from_the_defaults(tmp_path):
+    checks = load(tmp_path, SMALLEST + "[checks]\nmax_roll_deg = 20.0\n").checks
+    assert (checks.max_roll_deg, checks.max_pitch_up_deg) == (20.0, 2.0)
+
+
 def test_an_unknown_name_is_answered_with_the_nearest():
     with pytest.raises(ConfigError, match=r"there is no data set 'interndata'; did you mean interndata_n1\?"):
         load_dataset("interndata")
@@ -62,6 +67,8 @@ def test_an_unknown_name_is_answered_with_the_nearest():
         ("min_frames = true\n" + SMALLEST, "min_frames takes a whole number, found True"),
         ("max_pitch_deg = 'steep'\n" + SMALLEST, "max_pitch_deg takes a number, found 'steep'"),
         ("max_pitch_deg = nan\n" + SMALLEST, "max_pitch_deg must be finite, found nan"),
+        (SMALLEST + "[checks]\nmax_roll = 9.0\n", r"unknown key checks.max_roll; did you mean checks.max_roll_deg\?"),
+        (SMALLEST + "[checks]\nmax_roll_deg = -1.0\n", "checks: max_roll_deg must be finite and not negative"),
         (SMALLEST + "[cloud]\nobstacle_rgb = [0.0, 0.5]\n", "cloud.obstacle_rgb takes 3 values, found 2"),
         (SMALLEST.replace("[0]", "0"), "depth.invalid_codes takes a list in brackets, found 0"),
         ("robot = 3\n" + SMALLEST, "robot is a section, found the value 3"),
