@@ -7,6 +7,7 @@ from pathlib import Path
 
 from pipelines.running.stage import DONE, REFUSED, Settled
 from wsm_data.schema.verdict import Refusal
+from wsm_data.view.drawing.text_table import aligned
 
 _MILLION, _THOUSAND = 1e6, 1e4
 
@@ -86,8 +87,6 @@ def summary_table(reports: Sequence[StageReport]) -> str:
         )
         for report in reports
     ]
-    widths = [max(len(row[column]) for row in rows) for column in range(len(header))]
-    lines = ["  ".join(_cell(row, column, widths[column]) for column in range(len(row))).rstrip() for row in rows]
     reasons = [
         f"  {report.stage}: {count} x {reason}" for report in reports for reason, count in report.refusals.items()
     ]
@@ -96,12 +95,9 @@ def summary_table(reports: Sequence[StageReport]) -> str:
         for report in reports
         if report.waits_for
     ]
-    return "\n".join([*lines, *(["refused, by reason:", *reasons] if reasons else []), *waiting])
-
-
-def _cell(row: Sequence[str], column: int, width: int) -> str:
-    is_text = column in (0, len(row) - 1)
-    return row[column].ljust(width) if is_text else row[column].rjust(width)
+    return "\n".join(
+        [aligned(rows, right=range(1, 7)), *(["refused, by reason:", *reasons] if reasons else []), *waiting]
+    )
 
 
 def _number(value: float) -> str:
