@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 # Byte code is left to the first import of a module: most modules that are installed are never imported.
 INSTALL := $(BIN)/python -m pip -qq --disable-pip-version-check install --no-compile
 DEMO_OUT ?= runs/demo
-# One process of tests a core; whoever is done first takes over tests of the others.
+# One process of tests a core, which computes with one thread; whoever is done first takes over tests of the others.
 PYTEST_WORKERS ?= auto
 PYTEST_OPTIONS ?=
 
@@ -18,7 +18,7 @@ demo: $(VENV)/.ready
 	$(BIN)/wsm demo --out $(DEMO_OUT)
 
 test: $(VENV)/.ready-dev
-	$(BIN)/python -m pytest -n $(PYTEST_WORKERS) --dist worksteal $(PYTEST_OPTIONS)
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n $(PYTEST_WORKERS) --dist worksteal $(PYTEST_OPTIONS)
 
 check: $(VENV)/.ready-dev
 	$(BIN)/ruff format --check .

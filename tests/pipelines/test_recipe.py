@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from pipelines.recipe import Recipe, load_recipe, recipe_names, recipe_summaries, stage_config, stage_sections
-from pipelines.registry import STAGES
+from pipelines.registry import STAGES, load_stage
 from pipelines.running.settings import parse_assignments
 from wsm_data.errors import ConfigError
 
@@ -125,4 +125,4 @@ def test_the_source_may_also_be_given_to_the_stage_itself():
 def test_every_stage_can_be_configured_from_a_recipe():
     recipe = Recipe(stages=tuple(entry.name for entry in STAGES), source="tree")
     for name in recipe.stages:
-        stage_config(recipe, name, Path("run"))
+        assert type(stage_config(recipe, name, Path("run"))) is load_stage(name).config_type

@@ -242,8 +242,8 @@ def test_a_second_writer_is_refused(tmp_path, holder):
 def test_the_lock_of_a_killed_process_falls(tmp_path, holder):
     holder.kill()
     holder.wait()
-    with locked(tmp_path):
-        pass
+    with locked(tmp_path), pytest.raises(ConfigError), locked(tmp_path):
+        pass  # it is held anew
 
 
 def test_the_lock_falls_with_an_error(tmp_path):
