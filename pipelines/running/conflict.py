@@ -3,8 +3,9 @@
 from pathlib import Path
 
 from pipelines.running.folder import read_stage_record
-from pipelines.running.settings import differences, settings_of
+from pipelines.running.settings import settings_of
 from pipelines.running.stage import ConfigT, Stage
+from wsm_data.files.differences import differences
 from wsm_data.files.digest import digest_json
 
 

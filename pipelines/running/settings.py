@@ -2,11 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import Field, fields, is_dataclass
-from enum import Enum
 from pathlib import Path
 
 from wsm_data.errors import ConfigError
-from wsm_data.files.typed_toml import INPUT, Word, dotted
+from wsm_data.files.json_values import to_json
+from wsm_data.files.typed_toml import INPUT, Word
 
 
 def parse_assignments(assignments: Sequence[str]) -> dict[str, object]:
@@ -55,23 +55,6 @@ def config_json(config: object) -> dict[str, object]:
     return _fields_json(config, skip_roles=False)
 
 
-def differences(old: Mapping[str, object], new: Mapping[str, object], where: str = "") -> list[str]:
-    """Lines `name: old -> new` for every setting that differs."""
-    lines: list[str] = []
-    for key in sorted({*old, *new}):
-        if key not in old or key not in new:
-            lines.append(
-                f"{dotted(where, key)}: " + (f"{old[key]!r} -> absent" if key in old else f"absent -> {new[key]!r}")
-            )
-            continue
-        before, after = old[key], new[key]
-        if isinstance(before, Mapping) and isinstance(after, Mapping):
-            lines += differences(before, after, dotted(where, key))
-        elif before != after:
-            lines.append(f"{dotted(where, key)}: {before!r} -> {after!r}")
-    return lines
-
-
 def _fields(config: object) -> tuple[Field[object], ...]:
     return fields(config)  # type: ignore[arg-type]
 
@@ -91,8 +74,4 @@ def _as_json(value: object, skip_roles: bool) -> object:
         return {str(key): _as_json(item, skip_roles) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
         return [_as_json(item, skip_roles) for item in value]
-    if isinstance(value, Enum):
-        return value.value
-    if isinstance(value, Path):
-        return str(value if skip_roles else value.absolute())
-    return value
+    return str(value.absolute()) if isinstance(value, Path) and not skip_roles else to_json(value)

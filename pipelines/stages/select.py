@@ -10,12 +10,13 @@ import pyarrow as pa
 
 from pipelines.artifacts.release_files import content_digest, copy_into_release
 from pipelines.running.command_text import command_text
-from pipelines.running.settings import differences, settings_of
+from pipelines.running.settings import settings_of
 from pipelines.running.stage import Outcome, Stage, StageContext, Unit
 from wsm_data.access.release import Release, open_release, read_manifest
 from wsm_data.curation.scores_table import ScoreTable, read_paths, read_scorers, read_scores
 from wsm_data.curation.select import INDEX_COLUMNS, ChosenClips, SelectionConfig, select_clips
 from wsm_data.errors import IntegrityError
+from wsm_data.files.differences import differences
 from wsm_data.files.digest import sha256_file
 from wsm_data.files.stores import open_store
 from wsm_data.files.typed_toml import INPUT

@@ -24,6 +24,7 @@ from torch.distributed.checkpoint.state_dict_saver import save
 
 from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.files.atomic import write_text
+from wsm_data.files.differences import differences
 from wsm_data.files.digest import xxh3_128_file
 from wsm_data.files.jsonlines import canonical_json
 from wsm_model.ranks import rank_and_world_size, wait_for_all
@@ -84,7 +85,7 @@ def load_checkpoint(
         IntegrityError: it is damaged.
     """
     state = read_state(path)
-    _require_same(path, dict(state.identity), dict(identity))
+    _require_same(path, state.identity, identity)
     _prepare_moments(model, optimiser, state.step)
     rank, world_size = rank_and_world_size()
     try:
@@ -169,10 +170,8 @@ def _prepare_moments(model: nn.Module, optimiser: torch.optim.Optimizer, step: i
         optimiser.state[parameter] = {"step": torch.tensor(float(step)), **moments} if step else {}
 
 
-def _require_same(path: Path, found: dict[str, object], wanted: dict[str, object]) -> None:
-    other = sorted(name for name in found.keys() | wanted.keys() if found.get(name) != wanted.get(name))
-    if other:
-        lines = [f"  {name}: {found.get(name)!r} in the checkpoint, {wanted.get(name)!r} now" for name in other]
+def _require_same(path: Path, found: Mapping[str, object], wanted: Mapping[str, object]) -> None:
+    if lines := differences(found, wanted):
         raise ConfigError(
-            "\n".join([f"{path} belongs to another run; give another --out, or the same settings:", *lines])
+            "\n  ".join([f"{path} belongs to another run; give another --out, or the same settings:", *lines])
         )

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from pipelines.running.settings import config_json, differences, input_fields, merge, parse_assignments, settings_of
+from pipelines.running.settings import config_json, input_fields, merge, parse_assignments, settings_of
 from wsm_data.errors import ConfigError
 from wsm_data.files.typed_toml import INPUT, SPEED
 
@@ -71,9 +71,3 @@ def test_the_whole_config_holds_everything_and_paths_from_the_root(tmp_path, mon
     whole = config_json(Config(source=Path("tree")))
     assert whole["source"] == str(tmp_path / "tree")
     assert whole["grid"]["cache"] == str(tmp_path / "cache")
-
-
-def test_differences_name_every_setting_that_changed_with_both_values():
-    old = {"a": 1, "grid": {"x": 1, "y": 2}, "gone": None}
-    new = {"a": 1, "grid": {"x": 1, "y": 3}, "new": None}
-    assert differences(old, new) == ["gone: None -> absent", "grid.y: 2 -> 3", "new: absent -> None"]

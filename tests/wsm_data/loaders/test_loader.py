@@ -118,7 +118,7 @@ def test_a_state_behind_the_end_is_refused(make_loader):
 
 
 def test_a_state_of_another_order_is_refused_field_by_field(make_loader):
-    with pytest.raises(ConfigError, match=r"order.seed: saved 3, now 4"):
+    with pytest.raises(ConfigError, match=r"order.seed: 3 -> 4"):
         make_loader(seed=4).load_state_dict(make_loader().state_dict())
 
 

@@ -147,7 +147,7 @@ def test_other_queries_are_another_order(driven):
         state = loader.state_dict()
     with (
         QueryLoader(config_of(release), replace(TWO, future_latents=1)) as loader,
-        pytest.raises(ConfigError, match=r"queries\.future_latents: saved 2, now 1"),
+        pytest.raises(ConfigError, match=r"queries\.future_latents: 2 -> 1"),
     ):
         loader.load_state_dict(state)
 

@@ -204,8 +204,8 @@ def test_another_run_is_refused_with_every_field_that_differs_and_fills_nothing(
         load_checkpoint(saved.path, run.model, run.optimiser, other)
     assert str(caught.value).splitlines() == [
         f"{saved.path} belongs to another run; give another --out, or the same settings:",
-        "  model.size: 'small' in the checkpoint, 'tiny' now",
-        "  training.loss.depth: None in the checkpoint, 2.0 now",
+        '  model.size: "small" -> "tiny"',
+        "  training.loss.depth: absent -> 2.0",
     ]
     for wanted, found in zip(before, run.model.parameters(), strict=True):
         assert torch.equal(found, wanted)

@@ -7,11 +7,11 @@ import numpy as np
 
 from wsm_data.access.release import read_manifest
 from wsm_data.errors import ConfigError
+from wsm_data.files.differences import differences
 from wsm_data.files.stores import open_store
 from wsm_data.loaders.config import Arrangement, OrderConfig, Remainder, SourceConfig
 from wsm_data.loaders.sources.clips import Sources, open_sources
 from wsm_data.loaders.sources.queries import QueryConfig, open_queries
-from wsm_data.loaders.sources.state import difference_lines
 from wsm_data.shards.manifest import release_digest
 
 
@@ -57,11 +57,12 @@ def open_recorded_sources(identity: Mapping[str, Any], releases: Sequence[str], 
         )
     queries = identity["sources"][0].get("queries")
     sources = open_sources(configs) if queries is None else open_queries(configs, QueryConfig(**queries))
-    lines = difference_lines({"sources": identity["sources"]}, {"sources": sources.identity()})
+    lines = differences({"sources": identity["sources"]}, {"sources": sources.identity()})
     if lines:
         raise ConfigError(
-            f"the releases and selections given do not make the clips of the run\n{lines}\n"
-            "Give the selection of the run by --selection"
+            "the releases and selections given do not make the clips of the run\n  "
+            + "\n  ".join(lines)
+            + "\nGive the selection of the run by --selection"
         )
     return sources
 

@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wsm_data.errors import ConfigError
+from wsm_data.files.differences import differences
 from wsm_data.files.journal import JournalWriter
 from wsm_data.files.jsonlines import canonical_json
 from wsm_data.loaders.ledger.files import LEDGER_VERSION, journal_name, ledger_files, read_session
-from wsm_data.loaders.sources.state import difference_lines
 
 
 class LedgerWriter:
@@ -108,9 +108,10 @@ def _require_identity(folder: Path, identity: Mapping[str, Any]) -> None:
     """Refuse to mix two runs; the first file that has a head stands for all."""
     heads = (read_session(path) for path in ledger_files(folder).values())
     session = next((head for head in heads if head is not None), None)
-    lines = difference_lines(session["identity"], identity) if session is not None else ""
+    lines = differences(session["identity"], identity) if session is not None else []
     if lines:
         raise ConfigError(
-            f"the ledger {folder} is that of a run over other sources or in another order\n{lines}\n"
-            "Give each run a ledger of its own"
+            f"the ledger {folder} is that of a run over other sources or in another order\n  "
+            + "\n  ".join(lines)
+            + "\nGive each run a ledger of its own"
         )

@@ -4,11 +4,12 @@ What only changes how the bytes are read (ranks, workers, threads, prefetch, the
 """
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
 from wsm_data.errors import ConfigError
+from wsm_data.files.differences import differences
 from wsm_data.files.jsonlines import canonical_json
 from wsm_data.loaders.config import OrderConfig
 from wsm_data.loaders.sources.clips import Sources
@@ -17,7 +18,6 @@ STATE_VERSION = 1
 """Raised when the same settings would give another order."""
 
 _POSITION = ("epoch", "step")
-_ABSENT = "nothing"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,19 +64,14 @@ def restore(record: Mapping[str, Any], expected: LoaderState) -> tuple[int, int]
             the message says field by field what it has and what the loader has.
     """
     wanted = state_to_json(expected)
-    lines = difference_lines(_without_position(record), _without_position(wanted))
-    if lines:
+    if lines := differences(_without_position(record), _without_position(wanted)):
         raise ConfigError(
-            "a saved state can only be restored over the same sources with the same settings of the order, found\n"
-            f"{lines}\nGive the loader what was saved, or begin a new run without the state"
+            "a saved state can only be restored over the same sources with the same settings of the order, found\n  "
+            + "\n  ".join(lines)
+            + "\nGive the loader what was saved, or begin a new run without the state"
         )
     epoch, step = (_count(record, name) for name in _POSITION)
     return epoch, step
-
-
-def difference_lines(saved: Mapping[str, Any], now: Mapping[str, Any]) -> str:
-    """A line for every field in which two JSON objects differ, in the order of the names; empty where none does."""
-    return "\n".join(f"  {name}: saved {before}, now {after}" for name, before, after in _differences("", saved, now))
 
 
 def _without_position(record: Mapping[str, Any]) -> dict[str, Any]:
@@ -88,20 +83,3 @@ def _count(record: Mapping[str, Any], name: str) -> int:
     if not isinstance(value, int) or isinstance(value, bool) or value < 0:
         raise ConfigError(f"{name} of a saved state must be a number of at least 0, found {value!r}; restore the file")
     return value
-
-
-def _differences(name: str, saved: Any, now: Any) -> Iterator[tuple[str, str, str]]:
-    """Name, saved value and present value of every field that differs, in the order of the names."""
-    if isinstance(saved, Mapping) and isinstance(now, Mapping):
-        for key in sorted({*saved, *now}):
-            yield from _differences(f"{name}.{key}" if name else key, saved.get(key), now.get(key))
-    elif isinstance(saved, list) and isinstance(now, list) and any(isinstance(item, Mapping) for item in saved + now):
-        for number in range(max(len(saved), len(now))):
-            items = [part[number] if number < len(part) else None for part in (saved, now)]
-            yield from _differences(f"{name}[{number}]", *items)
-    elif saved != now:
-        yield name, _word(saved), _word(now)
-
-
-def _word(value: Any) -> str:
-    return _ABSENT if value is None else json.dumps(value)

@@ -41,7 +41,7 @@ def test_a_ledger_of_another_run_is_refused_with_both_identities(tmp_path):
     with LedgerWriter(tmp_path, {"seed": 1, "sources": (2, 3)}, 0, 1) as writer:
         writer.begin(0, 0, 1)
     LedgerWriter(tmp_path, {"sources": [2, 3], "seed": 1}, 0, 4)  # the same as JSON, on another world size
-    with pytest.raises(ConfigError, match=r"(?s)  seed: saved 1, now 2\nGive each run a ledger of its own"):
+    with pytest.raises(ConfigError, match=r"(?s)  seed: 1 -> 2\nGive each run a ledger of its own"):
         LedgerWriter(tmp_path, {"seed": 2, "sources": [2, 3]}, 0, 1)
 
 

@@ -47,7 +47,7 @@ def test_other_settings_of_the_order_are_told_field_by_field(make_state: MakeSta
     saved = state_to_json(make_state())
     with pytest.raises(ConfigError) as caught:
         restore(saved, make_state(order=replace(ORDER, seed=4, chunk_sizes=(1, 2))))
-    assert "\n  order.chunk_sizes: saved [1, 2, 3, 4], now [1, 2]\n  order.seed: saved 3, now 4\n" in str(caught.value)
+    assert "\n  order.chunk_sizes: [1, 2, 3, 4] -> [1, 2]\n  order.seed: 3 -> 4\n" in str(caught.value)
 
 
 def test_another_release_is_told_by_both_digests(make_state: MakeState, tiny: SimpleNamespace) -> None:
@@ -58,27 +58,25 @@ def test_another_release_is_told_by_both_digests(make_state: MakeState, tiny: Si
     now = expected.sources[0]["release_digest"]
     with pytest.raises(ConfigError) as caught:
         restore(saved, expected)
-    assert f'sources[0].release_digest: saved "{saved["sources"][0]["release_digest"]}", now "{now}"' in str(
-        caught.value
-    )
-    assert "sources[0].clips: saved 5, now 4" in str(caught.value)
+    assert f'sources[0].release_digest: "{saved["sources"][0]["release_digest"]}" -> "{now}"' in str(caught.value)
+    assert "sources[0].clips: 5 -> 4" in str(caught.value)
 
 
 def test_a_source_that_was_added_or_taken_away_is_told(make_state: MakeState, tiny: SimpleNamespace) -> None:
     one = SourceConfig(release=str(tiny.folder))
     two = replace(one, split="test", weight=0.5)
-    with pytest.raises(ConfigError, match=r'sources\[1\]: saved nothing, now {"clips": 2, '):
+    with pytest.raises(ConfigError, match=r'sources\[1\]: absent -> {"clips": 2, '):
         restore(state_to_json(make_state(one)), make_state(one, two))
-    with pytest.raises(ConfigError, match=r"sources\[1\]: saved {.*}, now nothing"):
+    with pytest.raises(ConfigError, match=r"sources\[1\]: {.*} -> absent"):
         restore(state_to_json(make_state(one, two)), make_state(one))
-    with pytest.raises(ConfigError, match=r"sources\[1\]\.weight: saved 0\.5, now 0\.25\n") as caught:
+    with pytest.raises(ConfigError, match=r"sources\[1\]\.weight: 0\.5 -> 0\.25\n") as caught:
         restore(state_to_json(make_state(one, two)), make_state(one, replace(two, weight=0.25)))
-    assert str(caught.value).count("saved") == 3  # in the first sentence, in the one line, and in the last sentence
+    assert str(caught.value).count(" -> ") == 1
 
 
 def test_a_state_of_another_version_is_refused(make_state: MakeState) -> None:
     saved = state_to_json(make_state()) | {"version": 0}
-    with pytest.raises(ConfigError, match="version: saved 0, now 1"):
+    with pytest.raises(ConfigError, match="version: 0 -> 1"):
         restore(saved, make_state())
 
 

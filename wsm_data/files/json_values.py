@@ -1,0 +1,46 @@
+"""Frozen dataclasses as JSON objects, and back by the types of their fields, exactly."""
+
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from enum import Enum
+from pathlib import Path
+from typing import Any, TypeVar
+
+from wsm_data.errors import ConfigError
+from wsm_data.files.differences import differences
+from wsm_data.files.typed_toml import build_config
+
+ValueT = TypeVar("ValueT")
+
+
+def to_json(value: Any) -> Any:
+    """The JSON value of a value: dataclasses and mappings as objects, sequences as lists, enums and paths as text.
+
+    Numbers survive JSON to the bit. What is none of these is left as it is.
+    """
+    if is_dataclass(value) and not isinstance(value, type):
+        return {field.name: to_json(getattr(value, field.name)) for field in fields(value)}
+    if isinstance(value, Mapping):
+        return {str(key): to_json(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [to_json(item) for item in value]
+    if isinstance(value, Enum):
+        return value.value
+    return str(value) if isinstance(value, Path) else value
+
+
+def from_json(kind: type[ValueT], record: Mapping[str, Any]) -> ValueT:
+    """Inverse of `to_json`: every field must be there, at any depth, none may be unknown, and each have its type.
+
+    Raises:
+        ValueError: the object is none of this kind; says which field is why.
+    """
+    if not isinstance(record, Mapping):
+        raise ValueError(f"it must be an object of {kind.__name__}, found {record!r}")
+    try:
+        value = build_config(kind, record)
+    except ConfigError as error:
+        raise ValueError(str(error)) from error
+    if changed := differences(record, to_json(value)):
+        raise ValueError(f"it must have exactly the fields of {kind.__name__}, differing: {'; '.join(changed)}")
+    return value
