@@ -9,10 +9,9 @@ that say what their absence means.
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import Any
 
 import fsspec
 import numpy as np
@@ -24,6 +23,7 @@ from numpy.typing import NDArray
 from wsm_data.curation.path_outline import PATH_POINTS, Outlines
 from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.files.atomic import atomic_file
+from wsm_data.files.json_values import from_json, to_json
 from wsm_data.files.jsonlines import canonical_json
 from wsm_data.files.typed_toml import did_you_mean
 from wsm_data.schema.arrays import Float32Array, Float64Array, require_array, require_finite
@@ -228,7 +228,7 @@ def _schema(release_digest: str, scorers: Sequence[ScorerInfo]) -> pa.Schema:
     record = {
         "version": SCORES_VERSION,
         "release_digest": release_digest,
-        "scorers": [asdict(one) for one in scorers],
+        "scorers": to_json(scorers),
     }
     columns = [(KEY_COLUMN, pa.string()), (PATH_COLUMN, pa.binary(_PATH_BYTES)), (FLOOR_COLUMN, pa.float32())]
     columns += [(one.name, pa.float64()) for one in scorers]
@@ -276,18 +276,11 @@ def _parse_metadata(schema: pa.Schema) -> tuple[str, tuple[ScorerInfo, ...]]:
     record = json.loads((schema.metadata or {}).get(_METADATA_KEY, b"{}"))
     if record.get("version") != SCORES_VERSION:
         raise ValueError(f"its version must be {SCORES_VERSION}, found {record.get('version')!r}; use a matching wsm")
-    scorers = tuple(_parse_info(one) for one in record["scorers"])
+    scorers = tuple(from_json(ScorerInfo, one) for one in record["scorers"])
     wanted = _schema(record["release_digest"], scorers)
     if schema != wanted:
         raise ValueError(f"its columns must be {wanted.names} of text and float64, found {schema.names}")
     return str(record["release_digest"]), scorers
-
-
-def _parse_info(record: Mapping[str, Any]) -> ScorerInfo:
-    names = {field.name for field in fields(ScorerInfo)}
-    if set(record) != names:
-        raise ValueError(f"a score must say {sorted(names)} of itself, found {sorted(record)}")
-    return ScorerInfo(**{**record, "direction": Direction(record["direction"])})
 
 
 def _chosen(scorers: Sequence[ScorerInfo], only: Sequence[str] | None, where: str) -> tuple[ScorerInfo, ...]:

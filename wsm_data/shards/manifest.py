@@ -2,12 +2,12 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, is_dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from wsm_data.errors import IntegrityError
 from wsm_data.files.digest import digest_json, sha256_bytes
+from wsm_data.files.json_values import from_json, to_json
 from wsm_data.schema.codec import CodecInfo
 from wsm_data.schema.depth import DepthRange
 from wsm_data.shards.names import MANIFEST_NAME, is_shard_name
@@ -103,7 +103,7 @@ def manifest_bytes(manifest: ReleaseManifest) -> bytes:
 
     `content_sha256` is the digest of all the other fields in canonical JSON: a changed byte anywhere contradicts it.
     """
-    record = {item.name: _plain(getattr(manifest, item.name)) for item in fields(manifest)}
+    record = to_json(manifest)
     record["content_sha256"] = digest_json(record)
     text = json.dumps(record, sort_keys=True, indent=2, ensure_ascii=False, allow_nan=False)
     return text.encode() + b"\n"
@@ -129,7 +129,7 @@ def parse_manifest(data: bytes, where: str) -> ReleaseManifest:
         version = record["schema_version"]
         if version != RELEASE_SCHEMA_VERSION:
             raise ValueError(f"schema_version must be {RELEASE_SCHEMA_VERSION}, found {version!r}; use a matching wsm")
-        manifest = _from_json(record)
+        manifest = from_json(ReleaseManifest, {name: item for name, item in record.items() if name != "content_sha256"})
         if manifest_bytes(manifest) != data:
             raise ValueError("it was changed since it was written; restore the file")
     except (ValueError, TypeError, KeyError) as error:
@@ -140,30 +140,3 @@ def parse_manifest(data: bytes, where: str) -> ReleaseManifest:
 def withdraw_manifest(folder: Path) -> None:
     """Remove dataset.json, so that a release that is being written, or written again, is seen as unfinished."""
     (folder / MANIFEST_NAME).unlink(missing_ok=True)
-
-
-def _from_json(record: Mapping[str, Any]) -> ReleaseManifest:
-    parsed = {
-        "shards": tuple(ShardInfo(**shard) for shard in record["shards"]),
-        "codec": CodecInfo.from_json(record["codec"]),
-        "rgb_statistics": _statistics(record["rgb_statistics"]),
-        "depth_statistics": _statistics(record["depth_statistics"]),
-        "depth_range": DepthRange(**record["depth_range"]),
-    }
-    others = {name: value for name, value in record.items() if name != "content_sha256"}
-    return ReleaseManifest(**{**others, **parsed})
-
-
-def _statistics(record: Mapping[str, Any]) -> LatentStatistics:
-    return LatentStatistics(count=record["count"], mean=tuple(record["mean"]), std=tuple(record["std"]))
-
-
-def _plain(value: object) -> object:
-    """JSON values of a manifest: dataclasses and mappings to objects, tuples to lists."""
-    if is_dataclass(value):
-        return {item.name: _plain(getattr(value, item.name)) for item in fields(value)}
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    return value
