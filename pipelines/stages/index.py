@@ -12,13 +12,12 @@ from pipelines.artifacts.source import container_json, conventions_digest, write
 from pipelines.running.folder import refusal_json
 from pipelines.running.settings import config_json
 from pipelines.running.stage import DONE, Finished, Outcome, Settled, Stage, StageContext, Unit, refused
-from wsm_data.checks.record import check_record
-from wsm_data.clips.depth_fusion import fused_points
-from wsm_data.clips.depth_gate import agreeing_records
+from wsm_data.checks.record import record_refusal
+from wsm_data.clips.scene_surface import scene_surface
 from wsm_data.errors import DataError, Reason
 from wsm_data.files.digest import digest_json, sha256_file
 from wsm_data.files.typed_toml import INPUT
-from wsm_data.maps.voxels import save_voxels, voxels_digest, voxels_from_cloud, voxels_from_depth
+from wsm_data.maps.voxels import save_voxels, voxels_digest
 from wsm_data.readers.manifest import load_dataset
 from wsm_data.readers.record_table import write_records
 from wsm_data.readers.registry import source_reader
@@ -82,7 +81,7 @@ def _index_container(
     records = records_path(out, container.id)
     records.parent.mkdir(parents=True, exist_ok=True)
     write_records(records, kept)
-    surface, cloud_refusal = _write_surface(scan, kept, dataset, surface_path(out, container.id))
+    surface, cloud_refusal = _write_surface(container, scan, kept, dataset, surface_path(out, container.id))
     rows = [_row(record) for record in kept]
     facts = {
         "frames": sum(record.frame_count for record in kept),
@@ -107,37 +106,24 @@ def _checked(scan: ContainerScan, dataset: DatasetManifest) -> tuple[list[Episod
     """Records that pass every check, and the refusals of the others, the reader's own included."""
     kept, refusals = [], list(scan.refusals)
     for record in scan.records:
-        failed = next((verdict for verdict in check_record(record, dataset) if verdict.reason is not None), None)
-        if failed is None or failed.reason is None:
+        refusal = record_refusal(record, dataset)
+        if refusal is None:
             kept.append(record)
-            continue
-        refusals.append(
-            Refusal(
-                unit=record.id.text,
-                source=record.container,
-                reason=failed.reason,
-                message=failed.message,
-                details=failed.measured,
-            )
-        )
+        else:
+            refusals.append(refusal)
     return kept, refusals
 
 
 def _write_surface(
-    scan: ContainerScan, records: Sequence[EpisodeRecord], dataset: DatasetManifest, path: Path
+    container: Container, scan: ContainerScan, records: Sequence[EpisodeRecord], dataset: DatasetManifest, path: Path
 ) -> tuple[str, Refusal | None]:
     """Write the scene's surface; returns its digest, or the empty text and the reason why there is none."""
     if scan.cloud_refusal is not None:
         return "", scan.cloud_refusal
     try:
-        if scan.cloud is not None:
-            voxels = voxels_from_cloud(scan.cloud, dataset.cloud)
-        else:
-            agreeing = agreeing_records(records, scan.depth_samples, dataset)
-            voxels = voxels_from_depth(fused_points(agreeing, scan.depth_samples, dataset.depth))
+        voxels = scene_surface(scan, records, dataset)
     except DataError as error:
-        container = records[0].container if records else ""
-        return "", Refusal.from_error(container, container, error)
+        return "", Refusal.from_error(container.id, container.id, error)
     save_voxels(path, voxels)
     return voxels_digest(voxels), None
 

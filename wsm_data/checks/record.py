@@ -8,7 +8,7 @@ from wsm_data.checks.mount import check_mount
 from wsm_data.checks.pose_jump import check_pose_jump
 from wsm_data.schema.dataset import DatasetManifest
 from wsm_data.schema.episode import EpisodeRecord
-from wsm_data.schema.verdict import Verdict
+from wsm_data.schema.verdict import Refusal, Verdict
 
 RECORD_CHECKS: tuple[Callable[[EpisodeRecord, DatasetManifest], Verdict], ...] = (
     lambda record, dataset: check_length(record, dataset.min_frames),
@@ -21,3 +21,17 @@ RECORD_CHECKS: tuple[Callable[[EpisodeRecord, DatasetManifest], Verdict], ...] =
 def check_record(record: EpisodeRecord, dataset: DatasetManifest) -> tuple[Verdict, ...]:
     """Verdicts of all record checks, in the order of RECORD_CHECKS; a failed one does not stop the others."""
     return tuple(check(record, dataset) for check in RECORD_CHECKS)
+
+
+def record_refusal(record: EpisodeRecord, dataset: DatasetManifest) -> Refusal | None:
+    """The first reason not to keep a record, written down; None where every check keeps it."""
+    for verdict in check_record(record, dataset):
+        if verdict.reason is not None:
+            return Refusal(
+                unit=record.id.text,
+                source=record.container,
+                reason=verdict.reason,
+                message=verdict.message,
+                details=verdict.measured,
+            )
+    return None

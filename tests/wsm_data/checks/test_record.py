@@ -1,6 +1,6 @@
 import dataclasses
 
-from wsm_data.checks.record import RECORD_CHECKS, check_record
+from wsm_data.checks.record import RECORD_CHECKS, check_record, record_refusal
 from wsm_data.errors import Reason
 
 
@@ -22,3 +22,11 @@ def test_all_faults_of_a_record_are_told_in_a_fixed_order(make_record, dataset):
         Reason.MOUNT_MISFIT,
         Reason.POSE_JUMP,
     ]
+
+
+def test_the_first_fault_is_the_refusal_and_a_sound_record_has_none(make_record, dataset):
+    assert record_refusal(make_record(), dataset) is None
+    record = make_record(frames=4, height_m=3.0)
+    refusal = record_refusal(record, dataset)
+    assert (refusal.unit, refusal.source) == (record.id.text, record.container)
+    assert (refusal.reason, refusal.details) == (Reason.EPISODE_TOO_SHORT, {"frames": 4})
