@@ -4,10 +4,11 @@ from collections.abc import Sequence
 
 from wsm_data.clips.depth_fusion import fused_points
 from wsm_data.clips.depth_gate import agreeing_records
-from wsm_data.maps.voxels import SurfaceVoxels, voxels_from_cloud, voxels_from_depth
+from wsm_data.maps.voxels import voxels_from_cloud, voxels_from_depth
 from wsm_data.readers.source import ContainerScan
 from wsm_data.schema.dataset import DatasetManifest
 from wsm_data.schema.episode import EpisodeRecord
+from wsm_data.schema.surface import SurfaceVoxels
 
 
 def scene_surface(scan: ContainerScan, records: Sequence[EpisodeRecord], dataset: DatasetManifest) -> SurfaceVoxels:
