@@ -75,10 +75,10 @@ def training_step(attention: str, latents: int) -> dict[str, float]:
     """Seconds of a step and the growth of peak memory, in this process."""
     import torch
 
+    from wsm_data.schema.sequence import SequenceSpan
     from wsm_model.inputs import ModelInputs
     from wsm_model.layers.pose import identity_poses
     from wsm_model.losses.total import LossConfig, pretraining_loss
-    from wsm_model.mot.chunks import SequenceSpan
 
     model, rgb = _model(attention), _latents(1, latents)
     inputs = ModelInputs(

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from types import MappingProxyType
 
+from wsm_data.schema.sequence import POSE_SLOTS
+
 
 class Expert(StrEnum):
     """The three transformers that share one self-attention (paper, section 3.2)."""
@@ -81,7 +83,7 @@ class ModelConfig:
     latent_height: int = 12
     latent_width: int = 20
     patch: int = 2
-    pose_slots: int = 4
+    pose_slots: int = POSE_SLOTS
     time_frequencies: int = 256
     rope_theta: float = 10000.0
     norm_eps: float = 1e-6

@@ -5,13 +5,14 @@ Shape suffixes: B rows, F latents of a row, N sequences, M pose slots, C channel
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 from torch import Tensor
 
-from wsm_model.mot.chunks import FrameTable, SequenceSpan, frame_table
+from wsm_data.schema.sequence import FrameTable, SequenceSpan, frame_table
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class ModelInputs:
     """A teacher-forced batch.
 
@@ -35,9 +36,11 @@ class ModelInputs:
     spans: Sequence[SequenceSpan]
     depth_context: Tensor | None = None
 
+    @cached_property
     def table(self) -> FrameTable:
-        """Sequence, latent and chunk of every frame."""
-        return frame_table(self.spans, *self.rgb.shape[:2])
+        """Sequence, latent and chunk of every frame, on the processor."""
+        rows, latents = self.rgb.shape[:2]
+        return frame_table(self.spans, rows, latents)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,13 +10,13 @@ from functools import partial
 import torch
 from torch import Tensor
 
+from wsm_data.schema.sequence import FrameTable
 from wsm_model.config import Expert, ModelConfig
 from wsm_model.inputs import ModelInputs, ModelOutputs
 from wsm_model.layers.pose import identity_poses
 from wsm_model.mot.attention import JointTokens, attend_densely
 from wsm_model.mot.attention_blocks import PREDICTION, attend_by_blocks, plan_blocks
 from wsm_model.mot.attention_flex import attend_flexibly, block_mask
-from wsm_model.mot.chunks import FrameTable
 from wsm_model.mot.expert import Stream
 from wsm_model.mot.layer import Attend
 from wsm_model.mot.mask import dense_mask
@@ -53,7 +53,7 @@ class WorldSlamModel(MixtureOfTransformers):
         Raises:
             ValueError: the sequences do not fit the rows.
         """
-        table = inputs.table()
+        table = inputs.table
         streams = self.training_streams(inputs, table)
         context = self.goal_context(inputs.goal_camera0_m, table)
         attend = self._attend(inputs, table, context.device)
@@ -66,7 +66,7 @@ class WorldSlamModel(MixtureOfTransformers):
 
     def training_streams(self, inputs: ModelInputs, table: FrameTable) -> dict[Expert, Stream]:
         """Clean and prediction tokens of all experts: noisy RGB, and state queries of zero depth and identity pose."""
-        index = table.latent.to(inputs.rgb.device)
+        index = torch.from_numpy(table.latent).to(inputs.rgb.device)
         clean_time = torch.zeros_like(inputs.flow_time)
         rgb_time = torch.stack([clean_time, inputs.flow_time * FLOW_TIME_SCALE], dim=1)
         state_time = torch.stack(
@@ -94,7 +94,7 @@ class WorldSlamModel(MixtureOfTransformers):
     def goal_context(self, goal_camera0_m: Tensor, table: FrameTable) -> Tensor:
         """The goal token of each frame's sequence, [B, F, 1, D]; padding frames take that of the first sequence."""
         tokens = self.goal(goal_camera0_m)
-        return tokens[table.sequence.clamp(min=0).to(tokens.device)].unsqueeze(2)
+        return tokens[torch.from_numpy(table.sequence).clamp(min=0).to(tokens.device)].unsqueeze(2)
 
     def _attend(self, inputs: ModelInputs, table: FrameTable, device: torch.device) -> Attend:
         evaluate: Callable[[JointTokens], dict[Expert, Tensor]]

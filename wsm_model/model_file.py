@@ -18,33 +18,13 @@ from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.files.atomic import write_text
 from wsm_data.files.digest import sha256_file
 from wsm_data.files.typed_toml import build_config
+from wsm_data.schema.latent_standard import LatentStandard
 from wsm_model.config import ModelConfig
 from wsm_model.model import WorldSlamModel
 from wsm_model.ranks import rank_and_world_size, wait_for_all, whole
 
 WEIGHTS_FILE = "model.safetensors"
 CARD_FILE = "model.json"
-
-
-@dataclass(frozen=True, kw_only=True)
-class LatentStandard:
-    """How latents were standardised: per channel, before the model sees them.
-
-    Attributes:
-        codec: name of the codec.
-        codec_digest: digest of its settings and weights.
-        rgb_mean: of RGB latents.
-        rgb_std: of RGB latents.
-        depth_mean: of depth latents.
-        depth_std: of depth latents.
-    """
-
-    codec: str
-    codec_digest: str
-    rgb_mean: tuple[float, ...]
-    rgb_std: tuple[float, ...]
-    depth_mean: tuple[float, ...]
-    depth_std: tuple[float, ...]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -25,7 +25,8 @@ class Opened:
     def epoch(self) -> Iterator[Batch]:
         for batch in self._loader:
             clips = len(batch.refs)  # rows without a clip fill the last step
-            rows = slice(clips) if batch.row.tolist() == list(range(clips)) else batch.row
+            own = [span.row for span in batch.spans]
+            rows = slice(clips) if own == list(range(clips)) else own
             poses = batch.poses.view(len(batch.poses), 4 * LATENTS, 7)[rows, IDENTITY_SLOTS:]
             if poses.shape[1] != FRAMES:
                 raise ValueError(f"a clip must have {FRAMES} poses, found {poses.shape}")

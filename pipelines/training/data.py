@@ -12,7 +12,6 @@ from wsm_data.loaders.config import Arrangement, LoaderConfig, OrderConfig, Read
 from wsm_data.loaders.loader import ClipLoader
 from wsm_data.shards.manifest import ReleaseManifest
 from wsm_model.config import ModelConfig
-from wsm_model.model_file import LatentStandard
 from wsm_model.presets import preset
 
 _LOG = logging.getLogger(__name__)
@@ -77,25 +76,3 @@ def model_config(config: TrainRunConfig, manifest: ReleaseManifest) -> ModelConf
     except ValueError as error:
         raise ConfigError(f"release {manifest.name} does not fit the model: {error}") from error
     return replace(found, latent_channels=manifest.codec.channels)
-
-
-def latent_standard(manifest: ReleaseManifest) -> LatentStandard:
-    """How the loader standardises latents of this release: RGB by the codec where it has statistics of its own.
-
-    Raises:
-        ConfigError: the release has no statistics.
-    """
-    codec, rgb, depth = manifest.codec, manifest.rgb_statistics, manifest.depth_statistics
-    if not depth.mean or not (codec.latent_mean or rgb.mean):
-        raise ConfigError(
-            f"release {manifest.name} must have latent statistics to standardise by, but it was packed without "
-            "training clips; name a release with a split `train` first"
-        )
-    return LatentStandard(
-        codec=codec.name,
-        codec_digest=codec.digest,
-        rgb_mean=codec.latent_mean or rgb.mean,
-        rgb_std=codec.latent_std or rgb.std,
-        depth_mean=depth.mean,
-        depth_std=depth.std,
-    )

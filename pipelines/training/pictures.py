@@ -13,6 +13,8 @@ from wsm_data.codecs.depth import depth_m_from_latent_video
 from wsm_data.files.jsonlines import read_lines
 from wsm_data.loaders.batches.batch import Batch
 from wsm_data.schema.depth import DepthRange
+from wsm_data.schema.latent_standard import LatentStandard
+from wsm_data.schema.sequence import frames_of
 from wsm_data.view.clip.pictures import spread_frames
 from wsm_data.view.training.curves import draw_training_curves
 from wsm_data.view.training.dream_sheet import DreamSheet, draw_dream_sheet
@@ -22,7 +24,6 @@ from wsm_model.inference.sampler import flow_schedule
 from wsm_model.inference.session import Session
 from wsm_model.losses.pose import raw_frame_poses
 from wsm_model.model import WorldSlamModel
-from wsm_model.model_file import LatentStandard
 
 CURVE_UNITS = {
     "loss": "weighted sum (1)",
@@ -53,12 +54,12 @@ class Decoding:
 
     def rgb_u8(self, latents: Tensor) -> np.ndarray:
         """Standardised RGB latents [F, C, h, w] as pictures, uint8 [T, H, W, 3]."""
-        video = self.codec.decode(_raw(latents, self.standard.rgb_mean, self.standard.rgb_std))
+        video = self.codec.decode(self.standard.raw_rgb(latents.float().cpu().numpy()))
         return np.round((np.clip(video, -1.0, 1.0) + 1.0) * 127.5).astype(np.uint8)
 
     def depth_m(self, latents: Tensor) -> np.ndarray:
         """Standardised depth latents [F, C, h, w] as metres, float32 [T, H, W]."""
-        video = self.codec.decode(_raw(latents, self.standard.depth_mean, self.standard.depth_std))
+        video = self.codec.decode(self.standard.raw_depth(latents.float().cpu().numpy()))
         return depth_m_from_latent_video(video, self.depth_range)
 
 
@@ -92,7 +93,7 @@ def draw_dream(
         shift: gamma of the flow time.
         title: of the sheet.
     """
-    rgb, length = batch.rgb[0].float(), int(batch.lengths[0])
+    rgb, length = batch.rgb[0].float(), batch.spans[0].length
     chunk = config.session.chunk_size
     seen = max(1, min(length - chunk, int(length * _SEEN_SHARE)))
     end = min(length, seen + chunk)
@@ -135,14 +136,15 @@ def _draw(
     poses: Tensor,
 ) -> None:
     true_rgb, true_depth = batch.rgb[0, :end].float(), batch.depth[0, :end].float()
-    first = 4 * (seen - 1) + 1  # the first raw frame of the dream
-    frames = [first + one for one in spread_frames(4 * (end - seen), _FRAMES_SHOWN)]
+    first = frames_of(seen)  # the first raw frame of the dream
+    dreamed_frames = frames_of(end) - first
+    frames = [first + one for one in spread_frames(dreamed_frames, _FRAMES_SHOWN)]
     with_dream = torch.cat([true_rgb[:seen], dreamed])
     true_m, estimated_m = (
         raw_frame_poses(slots.float())[:, :3].double().cpu().numpy() for slots in (batch.poses[0, :end], poses)
     )
     sheet = DreamSheet(
-        title=f"{title}: {batch.keys[0]}, {4 * (seen - 1) + 1} frames seen, {4 * (end - seen)} dreamed",
+        title=f"{title}: {batch.keys[0]}, {first} frames seen, {dreamed_frames} dreamed",
         frames=tuple(frames),
         true_rgb_u8=decoding.rgb_u8(true_rgb)[frames],
         dreamed_rgb_u8=decoding.rgb_u8(with_dream)[frames],
@@ -154,8 +156,3 @@ def _draw(
         dreamed_path_m=estimated_m[first - 1 :],
     )
     draw_dream_sheet(sheet, path)
-
-
-def _raw(latents: Tensor, mean: tuple[float, ...], std: tuple[float, ...]) -> np.ndarray:
-    scale, offset = (np.array(values, np.float32)[:, None, None] for values in (std, mean))
-    return latents.float().cpu().numpy() * scale + offset

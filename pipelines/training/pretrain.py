@@ -22,7 +22,7 @@ import torch
 from tqdm import tqdm
 
 from pipelines.training.config import TrainRunConfig
-from pipelines.training.data import held_out_loader, latent_standard, model_config, training_loader
+from pipelines.training.data import held_out_loader, model_config, training_loader
 from pipelines.training.evaluation import evaluate
 from pipelines.training.pictures import Decoding, draw_curves, draw_dream
 from wsm_data.access.release import open_release
@@ -30,6 +30,7 @@ from wsm_data.errors import ConfigError
 from wsm_data.files.atomic import write_text
 from wsm_data.loaders.batches.batch import Batch
 from wsm_data.loaders.loader import ClipLoader
+from wsm_data.shards.latent_standard import latent_standard
 from wsm_data.shards.release_codec import codec_of
 from wsm_model.model import WorldSlamModel
 from wsm_model.model_file import ModelCard, load_model, save_model

@@ -6,10 +6,10 @@ from dataclasses import replace
 import pytest
 import torch
 
+from wsm_data.schema.sequence import SequenceSpan
 from wsm_model.config import ExpertConfig, ModelConfig, Variant
 from wsm_model.inputs import ModelInputs
 from wsm_model.model import Attention, WorldSlamModel
-from wsm_model.mot.chunks import SequenceSpan
 
 torch.set_num_threads(1)  # tensors of a few thousand numbers: a second thread only waits, and that costs a core
 

@@ -1,12 +1,14 @@
 """From a loader's batch to noised parts."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 import torch
 
-from wsm_model.batches import chunk_flow_times, noise_stream, spans_of, training_inputs
-from wsm_model.mot.chunks import SequenceSpan
+from wsm_data.schema.sequence import SequenceSpan
+from wsm_model.batches import chunk_flow_times, noise_stream, training_inputs
 
 SHIFT = 5.0
 
@@ -19,12 +21,14 @@ def batch(make_poses):
         rgb=torch.randn(3, 6, 6, 4, 6),
         depth=torch.randn(3, 6, 6, 4, 6),
         poses=make_poses(3, 6, 4),
-        row=torch.tensor([0, 1, 1, 2]),
-        start=torch.tensor([0, 0, 4, 0]),
-        lengths=torch.tensor([6, 4, 2, 3]),
-        chunk_size=torch.tensor([2, 1, 4, 3]),
+        spans=(
+            SequenceSpan(row=0, start=0, length=6, chunk_size=2),
+            SequenceSpan(row=1, start=0, length=4, chunk_size=1),
+            SequenceSpan(row=1, start=4, length=2, chunk_size=4),
+            SequenceSpan(row=2, start=0, length=3, chunk_size=3),
+        ),
         goal_camera0_m=torch.randn(4, 3),
-        refs=torch.tensor([5, 9, 2, 7]),
+        refs=np.array([5, 9, 2, 7]),
         keys=("a", "b", "c", "d"),
         epoch=1,
         step=4,
@@ -49,7 +53,7 @@ def test_parts_hold_every_sequence_once_with_the_noise_it_has_in_the_whole(batch
 
 def test_a_sequence_has_its_noise_whichever_row_it_falls_to(batch):
     (first,) = parts_of(batch)
-    batch.row, batch.rgb = torch.tensor([2, 1, 1, 0]), batch.rgb.flip(0)
+    batch.spans, batch.rgb = tuple(replace(span, row=2 - span.row) for span in batch.spans), batch.rgb.flip(0)
     (moved,) = parts_of(batch)
     assert torch.equal(first.noise[0], moved.noise[2])
     assert torch.equal(first.noise[2, :3], moved.noise[0, :3])
@@ -102,5 +106,6 @@ def test_a_chunk_has_one_flow_time():
     assert all(0 <= time <= 1 for time in times)
 
 
-def test_sequences_stand_where_the_batch_says(batch):
-    assert spans_of(batch)[2] == SequenceSpan(row=1, start=4, length=2, chunk_size=4)
+def test_sequences_stand_in_their_part_where_the_batch_says(batch):
+    _, part, _ = parts_of(batch, micro_rows=1)
+    assert part.inputs.spans == (replace(batch.spans[1], row=0), replace(batch.spans[2], row=0))

@@ -3,10 +3,10 @@
 import pytest
 import torch
 
+from wsm_data.schema.sequence import SequenceSpan
 from wsm_model.config import Expert, Variant
 from wsm_model.inputs import ModelInputs
 from wsm_model.model import Attention, WorldSlamModel
-from wsm_model.mot.chunks import SequenceSpan
 from wsm_model.mot.transformer import expert_of_parameter
 from wsm_model.presets import preset
 
@@ -21,7 +21,7 @@ ROUNDING = 1e-5  # of float32, over some hundred sums of numbers of size one
 
 def outputs_of(model: WorldSlamModel, inputs: ModelInputs) -> dict[str, torch.Tensor]:
     """What the model says of the latents that are no padding, by name."""
-    out, real = model(inputs), inputs.table().sequence >= 0
+    out, real = model(inputs), inputs.table.sequence >= 0
     found = {"velocity": out.velocity[real], "poses": out.poses[real]}
     return found | ({"depth": out.depth[real]} if out.depth is not None else {})
 

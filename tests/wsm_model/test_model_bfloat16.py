@@ -45,7 +45,7 @@ def test_outputs_and_gradients_are_those_of_float32_to_the_rounding_of_bfloat16(
         report.total.backward()
         found.append((outputs, report, {name: one.grad for name, one in model.named_parameters()}))
     (exact, exact_report, exact_gradients), (near, near_report, near_gradients) = found
-    real = inputs.table().sequence >= 0
+    real = inputs.table.sequence >= 0
     for name in ("velocity", "depth", "poses"):
         if getattr(exact, name) is not None:
             wanted, rounded = getattr(exact, name)[real], getattr(near, name)[real].float()
@@ -61,7 +61,7 @@ def test_losses_poses_and_what_modulates_are_float32(make_model, inputs):
     model = make_model()
     with bfloat16():
         outputs = model(inputs)
-        streams = model.training_streams(inputs, inputs.table())
+        streams = model.training_streams(inputs, inputs.table)
     assert outputs.poses.dtype == torch.float32
     assert outputs.velocity.dtype == torch.bfloat16
     report = pretraining_loss(inputs, outputs, torch.zeros_like(inputs.rgb), LossConfig())

@@ -6,7 +6,8 @@ import pytest
 import torch
 
 from wsm_data.errors import ConfigError, IntegrityError
-from wsm_model.model_file import LatentStandard, ModelCard, load_model, save_model
+from wsm_data.schema.latent_standard import LatentStandard
+from wsm_model.model_file import ModelCard, load_model, save_model
 
 STANDARD = LatentStandard(
     codec="dct", codec_digest="c0dec", rgb_mean=(0.0,), rgb_std=(1.0,), depth_mean=(0.5,), depth_std=(2.0,)

@@ -48,7 +48,7 @@ def test_gradients_are_exactly_zero_where_the_table_says_no_and_not_where_it_say
     make_model, make_inputs, make_spans, chunk_size, variant
 ):
     model, inputs = make_model(variant), make_inputs(make_spans([FRAMES], [chunk_size]))
-    table = inputs.table()
+    table = inputs.table
     streams = {
         expert: replace(stream, x=stream.x.detach().requires_grad_())
         for expert, stream in model.training_streams(inputs, table).items()

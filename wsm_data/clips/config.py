@@ -3,8 +3,9 @@
 import math
 from dataclasses import dataclass, field
 
-from wsm_data.codecs.base import SIDE_MULTIPLE_PX, TEMPORAL_RATIO
+from wsm_data.codecs.base import SIDE_MULTIPLE_PX
 from wsm_data.schema.depth import DepthRange
+from wsm_data.schema.sequence import TEMPORAL_RATIO
 from wsm_data.schema.surface import CELL_SIZE_M
 
 MIN_GOAL_RADIUS_M = math.sqrt(2) * CELL_SIZE_M

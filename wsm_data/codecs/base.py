@@ -7,8 +7,8 @@ import numpy as np
 
 from wsm_data.schema.arrays import Float32Array, require_array
 from wsm_data.schema.codec import CodecInfo
+from wsm_data.schema.sequence import TEMPORAL_RATIO
 
-TEMPORAL_RATIO = 4
 SIDE_MULTIPLE_PX = 32
 """Sides of a video are multiples of this: 16 pixels a latent cell, and 2 x 2 cells a patch of the transformer."""
 

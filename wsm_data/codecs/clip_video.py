@@ -6,7 +6,6 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import DTypeLike
 
-from wsm_data.codecs.base import TEMPORAL_RATIO
 from wsm_data.codecs.depth import UNMEASURED, log_depth_table, measured_table
 from wsm_data.codecs.images import depth_codes, rgb_pixels
 from wsm_data.codecs.resize import resize_colour, resize_depth
@@ -14,6 +13,7 @@ from wsm_data.errors import DataError, Reason
 from wsm_data.schema.arrays import BoolArray, Float32Array, Uint8Array, Uint16Array
 from wsm_data.schema.depth import DepthEncoding, DepthRange
 from wsm_data.schema.frames import DepthFrame, RgbFrame
+from wsm_data.schema.sequence import TEMPORAL_RATIO
 
 _Image = TypeVar("_Image", Uint8Array, Uint16Array)
 

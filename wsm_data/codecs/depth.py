@@ -9,9 +9,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from wsm_data.codecs.base import TEMPORAL_RATIO
 from wsm_data.schema.arrays import BoolArray, Float32Array, Float64Array, Uint8Array, Uint16Array, require_array
 from wsm_data.schema.depth import DepthEncoding, DepthRange
+from wsm_data.schema.sequence import TEMPORAL_RATIO
 
 _RAW_CODES = 1 << 16
 _FULL_SHARE = 255

@@ -219,7 +219,7 @@ class ClipLoader(torch.utils.data.IterableDataset[Batch]):
             return None
         batch = batch_of(delivered)
         if self._ledger is not None:
-            self._ledger.record(batch.epoch, batch.step, batch.refs.cpu().numpy())
+            self._ledger.record(batch.epoch, batch.step, batch.refs)
         self._step = batch.step + 1
         hand_over(batch)
         return delivered

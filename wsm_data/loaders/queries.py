@@ -14,16 +14,17 @@ from wsm_data.access.clip_reader import read_members, span_of_members
 from wsm_data.access.shard_reader import ShardReader
 from wsm_data.errors import IntegrityError
 from wsm_data.geometry.transform import transforms_from_vectors
-from wsm_data.loaders.batches.batch import POSE_SLOTS, Batch
+from wsm_data.loaders.batches.batch import Batch
 from wsm_data.loaders.batches.query_batch import QueryBatch
 from wsm_data.loaders.config import LoaderConfig, ReadConfig
 from wsm_data.loaders.loader import ClipLoader
 from wsm_data.loaders.order.epoch_order import EpochSummary
 from wsm_data.loaders.reading.verification import verification_of
 from wsm_data.loaders.sources.queries import QueryConfig, QuerySources, open_queries
-from wsm_data.schema.clip import TEMPORAL_RATIO, UNREACHABLE_MM
+from wsm_data.schema.clip import UNREACHABLE_MM
 from wsm_data.schema.clip_meta import ClipMeta
 from wsm_data.schema.occupancy import UNKNOWN
+from wsm_data.schema.sequence import TEMPORAL_RATIO, frames_of
 from wsm_data.shards.clip_bytes import content_of
 from wsm_data.shards.index_row import IndexRow
 from wsm_data.shards.members import META, STORED_DTYPES
@@ -150,7 +151,7 @@ class _MapReader:
             IntegrityError: the bytes of a clip are not those that the release vouches for; names shard and clip.
         """
         maps = self._clip_maps(history.refs.tolist(), readers)
-        replan = history.lengths.cpu().numpy() - 1
+        replan = np.array([span.length for span in history.spans], np.int64) - 1
         T_world_camera0 = np.array([one.meta.T_world_camera0_matrix for one in maps]).reshape(-1, 4, 4)
         resolution_m = np.array([one.meta.map_resolution_m for one in maps])
         origin_cell = np.array([one.meta.map_origin_cell for one in maps], np.int64).reshape(-1, 2)
@@ -172,7 +173,7 @@ class _MapReader:
         return QueryBatch(history=history, **{name: torch.from_numpy(array) for name, array in arrays.items()})
 
     def _future(self, maps: Sequence[_ClipMap], replan: np.ndarray) -> np.ndarray:
-        frames = 1 + TEMPORAL_RATIO * self._sources.queries.future_latents
+        frames = frames_of(1 + self._sources.queries.future_latents)
         future = np.empty((len(maps), frames), np.float32)
         for number, (one, latent) in enumerate(zip(maps, replan.tolist(), strict=True)):
             future[number] = one.expert_distance[TEMPORAL_RATIO * latent :][:frames]
@@ -209,8 +210,9 @@ def _meta(content: memoryview, row: IndexRow) -> ClipMeta:
 
 def _last_poses(history: Batch) -> np.ndarray:
     """Pose of the last raw frame of each history in its first camera's frame; float32 [N, 7]."""
-    last = (history.start + history.lengths - 1).cpu()
-    return np.asarray(history.poses.cpu()[history.row.cpu(), last, POSE_SLOTS - 1].numpy())
+    poses = history.poses.cpu().numpy()
+    rows, last = ([span.row for span in history.spans], [span.end - 1 for span in history.spans])
+    return np.asarray(poses[rows, last, -1])
 
 
 def _stacked(arrays: Sequence[np.ndarray], shapes: np.ndarray, padding: int, dtype: type[np.generic]) -> np.ndarray:

@@ -11,6 +11,7 @@ Float16Array = NDArray[np.float16]
 Uint8Array = NDArray[np.uint8]
 Uint16Array = NDArray[np.uint16]
 Int16Array = NDArray[np.int16]
+Int64Array = NDArray[np.int64]
 BoolArray = NDArray[np.bool_]
 
 

@@ -17,6 +17,8 @@ from wsm_data.schema.arrays import (
 )
 from wsm_data.schema.camera import Intrinsics
 from wsm_data.schema.clip_meta import ClipMeta
+from wsm_data.schema.pose import IDENTITY_POSE
+from wsm_data.schema.sequence import TEMPORAL_RATIO, frames_of
 
 MEMBERS: Mapping[str, tuple[np.dtype[np.generic], str]] = MappingProxyType(
     {
@@ -33,7 +35,6 @@ MEMBERS: Mapping[str, tuple[np.dtype[np.generic], str]] = MappingProxyType(
 
 META_MEMBER = "meta.json"
 UNREACHABLE_MM = 65535
-TEMPORAL_RATIO = 4
 _QUATERNION_TOLERANCE = 1e-5  # float32 rounding of four numbers of size one
 
 
@@ -72,7 +73,7 @@ class Clip:
                 require_finite(name, array)
             object.__setattr__(self, name, frozen_array(array))
         frames, latents = sizes["T"], sizes["F"]
-        if frames != 1 + TEMPORAL_RATIO * (latents - 1):
+        if frames != frames_of(latents):
             raise ValueError(
                 f"rgb_latent with F latent frames needs poses of T = 1 + {TEMPORAL_RATIO} (F - 1) raw frames, "
                 f"found F = {latents}, T = {frames}"
@@ -102,7 +103,7 @@ class Clip:
 
 
 def _require_poses(poses: Float32Array) -> None:
-    identity = np.array([0, 0, 0, 1, 0, 0, 0], np.float32)
+    identity = np.array(IDENTITY_POSE, np.float32)
     if not np.array_equal(poses[0], identity):
         raise ValueError(f"poses must start with the identity {identity.tolist()}, found {poses[0].tolist()}")
     error = np.abs(np.linalg.norm(poses[:, 3:].astype(np.float64), axis=1) - 1)

@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 
 from wsm_data.schema.arrays import Float16Array, Float64Array, frozen_array
-from wsm_data.schema.clip import TEMPORAL_RATIO, Clip
+from wsm_data.schema.clip import Clip
+from wsm_data.schema.sequence import TEMPORAL_RATIO
 
 STD_FLOOR = 1e-6
 """Least standard deviation, in latent units: a constant channel is divided by this, not by zero."""

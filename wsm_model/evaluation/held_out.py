@@ -10,11 +10,14 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from wsm_model.batches import ClipBatch, TrainingInputs, spans_of, training_inputs
+from wsm_data.schema.batch import ClipBatch
+from wsm_data.schema.sequence import chunk_start
+from wsm_model.batches import TrainingInputs, training_inputs
 from wsm_model.evaluation.trajectory import ate_rmse_m, constant_velocity, zero_motion
 from wsm_model.inference.session import Session, SessionConfig
 from wsm_model.losses.flow import flow_errors
 from wsm_model.losses.pose import raw_frame_poses
+from wsm_model.losses.total import counted_frames
 from wsm_model.model import WorldSlamModel
 
 
@@ -69,11 +72,11 @@ def estimate_states(model: WorldSlamModel, rgb_FChw: Tensor, config: SessionConf
     return depth, poses
 
 
-def clip_errors(model: WorldSlamModel, batch: ClipBatch, config: SessionConfig) -> list[ClipErrors]:
+def clip_errors(model: WorldSlamModel, batch: ClipBatch[Tensor], config: SessionConfig) -> list[ClipErrors]:
     """Errors of every clip of a batch."""
     found = []
-    for number, span in enumerate(spans_of(batch)):
-        place = (span.row, slice(span.start, span.start + span.length))
+    for number, span in enumerate(batch.spans):
+        place = span.place
         depth, poses = estimate_states(model, batch.rgb[place].float(), config)
         true_depth = batch.depth[place].float()
         recorded = ~batch.still[place].flatten()[-len(raw_frame_poses(poses)) :].cpu()
@@ -94,7 +97,9 @@ def clip_errors(model: WorldSlamModel, batch: ClipBatch, config: SessionConfig) 
 
 
 @torch.no_grad()
-def flow_matching_errors(model: WorldSlamModel, batches: Iterable[ClipBatch], *, seed: int, shift: float) -> FlowErrors:
+def flow_matching_errors(
+    model: WorldSlamModel, batches: Iterable[ClipBatch[Tensor]], *, seed: int, shift: float
+) -> FlowErrors:
     """Flow-matching losses, means over the latents that are dreamed.
 
     Args:
@@ -106,8 +111,7 @@ def flow_matching_errors(model: WorldSlamModel, batches: Iterable[ClipBatch], *,
     sums, count = np.zeros(3), 0
     for batch in batches:
         for part in training_inputs(batch, seed=seed, flow_shift=shift):
-            table = part.inputs.table()
-            counted = ((table.sequence >= 0) & (table.latent > 0)).to(part.noise.device)
+            _, counted = counted_frames(part.inputs.table, part.noise.device)
             guesses = (model(part.inputs).velocity, _copy_velocity(part), _unconditional_velocity(part))
             for number, velocity in enumerate(guesses):
                 errors = flow_errors(velocity, part.inputs.rgb, part.noise, part.inputs.flow_time, shift)
@@ -123,7 +127,7 @@ def _copy_velocity(part: TrainingInputs) -> Tensor:
     copied = inputs.rgb.clone()
     for span in inputs.spans:
         for latent in range(1, span.length):
-            last = (latent - 1) // span.chunk_size * span.chunk_size
+            last = chunk_start(latent, span.chunk_size) - 1
             copied[span.row, span.start + latent] = inputs.rgb[span.row, span.start + last]
     tau = inputs.flow_time[..., None, None, None].clamp(min=1e-3)
     return (inputs.noisy_rgb - copied) / tau

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from wsm_data.schema.sequence import chunk_start
 from wsm_model.config import Variant
 from wsm_model.inference.cache import FrameCache
 from wsm_model.inference.passes import History, StateEstimate, query_states, velocity, write_rgb, write_states
@@ -138,8 +139,7 @@ class Session:
 
     def _chunk_start(self, number: int) -> int:
         """First latent of the chunk of a latent; the anchor is a chunk of its own."""
-        size = self.config.chunk_size
-        return 1 + (number - 1) // size * size if number else 0
+        return chunk_start(number, self.config.chunk_size)
 
     def _make_room(self) -> None:
         if self._history.state.held == self.config.cache_latents:

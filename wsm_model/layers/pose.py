@@ -8,10 +8,8 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from wsm_data.schema.pose import IDENTITY_POSE, POSE_VALUES
 from wsm_model.layers.modulation import modulated_norm
-
-POSE_VALUES = 7
-IDENTITY = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 
 
 def rotation_matrices(quaternions: Tensor) -> Tensor:
@@ -27,7 +25,7 @@ def rotation_matrices(quaternions: Tensor) -> Tensor:
 
 def identity_poses(*shape: int, device: torch.device | None = None) -> Tensor:
     """Identity poses, float32 [*shape, 7]: what state queries ask with."""
-    return torch.tensor(IDENTITY, device=device).expand(*shape, POSE_VALUES)
+    return torch.tensor(IDENTITY_POSE, device=device).expand(*shape, POSE_VALUES)
 
 
 class PoseEmbedding(nn.Module):
@@ -73,7 +71,7 @@ class PoseHead(nn.Module):
         nn.init.normal_(self.table, std=self.table.shape[-1] ** -0.5)
         nn.init.zeros_(self.linear_2.weight)
         with torch.no_grad():
-            self.linear_2.bias.copy_(torch.tensor(IDENTITY))
+            self.linear_2.bias.copy_(torch.tensor(IDENTITY_POSE))
 
     def forward(self, x: Tensor, time: Tensor) -> Tensor:
         """Read poses from tokens; `time` is the time embedding e, broadcastable to x."""

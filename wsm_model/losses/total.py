@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from wsm_data.schema.sequence import NO_SEQUENCE, FrameTable, SequenceSpan
 from wsm_model.inputs import ModelInputs, ModelOutputs
 from wsm_model.losses.flow import flow_errors
 from wsm_model.losses.pose import pose_losses, raw_frame_poses
-from wsm_model.mot.chunks import SequenceSpan
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,6 +72,12 @@ def loss_counts(spans: Sequence[SequenceSpan]) -> LossCounts:
     return LossCounts(dreamed=latents - len(spans), latents=latents, sequences=len(spans))
 
 
+def counted_frames(table: FrameTable, device: torch.device) -> tuple[Tensor, Tensor]:
+    """Latents of sequences, and those of them that are dreamed: all but the anchors; bool [B, F] each."""
+    real = table.sequence != NO_SEQUENCE
+    return torch.from_numpy(real).to(device), torch.from_numpy(real & (table.latent > 0)).to(device)
+
+
 def pretraining_loss(
     inputs: ModelInputs,
     outputs: ModelOutputs,
@@ -92,11 +98,10 @@ def pretraining_loss(
         counts: what to divide by, where the batch is a part of a step; the parts of a step then add up to its losses.
     """
     counts = counts or loss_counts(inputs.spans)
-    table = inputs.table()
     device = outputs.velocity.device
-    real, later = (table.sequence >= 0).to(device), (table.latent > 0).to(device)
+    real, dreamed = counted_frames(inputs.table, device)
     errors = flow_errors(outputs.velocity, inputs.rgb, noise, inputs.flow_time, config.flow_shift)
-    parts = {"flow": _sum_where(errors, real & later) / max(1.0, counts.dreamed)}
+    parts = {"flow": _sum_where(errors, dreamed) / max(1.0, counts.dreamed)}
     if outputs.depth is not None:
         squared = (outputs.depth.float() - inputs.depth.float()).square().flatten(2).mean(-1)
         parts["depth"] = _sum_where(squared, real) / counts.latents
@@ -117,8 +122,7 @@ def _pose_parts(
 ) -> dict[str, Tensor]:
     found = []
     for span in inputs.spans:
-        place = (span.row, slice(span.start, span.start + span.length))
-        predicted, target = (raw_frame_poses(poses[place].float()) for poses in (outputs.poses, inputs.poses))
+        predicted, target = (raw_frame_poses(poses[span.place].float()) for poses in (outputs.poses, inputs.poses))
         found.append(pose_losses(predicted, target, config.pose_delta))
     absolute, relative = (torch.stack(part).sum() / counts.sequences for part in zip(*found, strict=True))
     return {"pose_absolute": absolute, "pose_relative": relative}

@@ -16,9 +16,9 @@ import torch
 from torch import Tensor
 from torch.nn.functional import scaled_dot_product_attention
 
+from wsm_data.schema.sequence import SequenceSpan, chunk_numbers
 from wsm_model.config import Expert, ModelConfig
 from wsm_model.mot.attention import Attended, JointTokens, QueriesKeysValues
-from wsm_model.mot.chunks import SequenceSpan, chunk_numbers
 from wsm_model.mot.mask import RULES, Rule, TokenKind, allowed
 
 CLEAN, PREDICTION = 0, 1
@@ -106,7 +106,7 @@ def attend_by_blocks(tokens: JointTokens, plan: Sequence[SequenceGroup]) -> Atte
 
 def _blocks(config: ModelConfig, length: int, chunk_sizes: list[int], device: torch.device) -> tuple[QueryBlock, ...]:
     latent = torch.arange(length)
-    chunk = torch.stack([chunk_numbers(latent, torch.tensor(size)) for size in chunk_sizes])
+    chunk = torch.stack([torch.from_numpy(chunk_numbers(length, size)) for size in chunk_sizes])
     chunk = chunk[:1] if len(set(chunk_sizes)) == 1 else chunk
     found = []
     for kind in TokenKind:

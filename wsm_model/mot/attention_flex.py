@@ -8,9 +8,9 @@ import torch
 from torch import Tensor
 from torch.nn.attention.flex_attention import BlockMask, create_block_mask, flex_attention
 
+from wsm_data.schema.sequence import FrameTable
 from wsm_model.config import ModelConfig
 from wsm_model.mot.attention import Attended, JointTokens, flatten_tokens, unflatten_tokens
-from wsm_model.mot.chunks import FrameTable
 from wsm_model.mot.mask import allowed, rule_matrix, token_table
 
 _LENGTHS = 256
@@ -21,7 +21,8 @@ def block_mask(config: ModelConfig, table: FrameTable, device: torch.device) -> 
     tokens = token_table(config, table.latent.shape[1])
     kind, frame = tokens.kind.to(device), tokens.frame.to(device)
     rules = rule_matrix(config.variant).to(device)
-    sequence, latent, chunk = (values.to(device) for values in (table.sequence, table.latent, table.chunk))
+    of_frames = (table.sequence, table.latent, table.chunk)
+    sequence, latent, chunk = (torch.from_numpy(values).to(device) for values in of_frames)
 
     def may_attend(b: Tensor, _head: Tensor, query: Tensor, key: Tensor) -> Tensor:
         q_frame, k_frame = frame[query], frame[key]

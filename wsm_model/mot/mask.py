@@ -22,8 +22,8 @@ from types import MappingProxyType
 import torch
 from torch import Tensor
 
+from wsm_data.schema.sequence import FrameTable
 from wsm_model.config import Expert, ModelConfig, Variant
-from wsm_model.mot.chunks import FrameTable
 
 
 class TokenKind(IntEnum):
@@ -126,7 +126,8 @@ def dense_mask(config: ModelConfig, table: FrameTable) -> Tensor:
     """
     tokens = token_table(config, table.latent.shape[1])
     rule = rule_matrix(config.variant)[tokens.kind[:, None], tokens.kind[None, :]]
-    sequence, latent, chunk = (values[:, tokens.frame] for values in (table.sequence, table.latent, table.chunk))
+    of_frames = (torch.from_numpy(values) for values in (table.sequence, table.latent, table.chunk))
+    sequence, latent, chunk = (values[:, tokens.frame] for values in of_frames)
     same = (sequence[:, :, None] == sequence[:, None, :]) & (sequence >= 0)[:, :, None]
     seen = allowed(
         rule,

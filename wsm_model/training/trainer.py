@@ -13,7 +13,8 @@ from torch import Tensor
 from torch.nn.utils import clip_grad_norm_
 
 from wsm_data.errors import NumericalError
-from wsm_model.batches import ClipBatch, TrainingInputs, spans_of, training_inputs
+from wsm_data.schema.batch import ClipBatch
+from wsm_model.batches import TrainingInputs, training_inputs
 from wsm_model.losses.total import LossCounts, loss_counts, pretraining_loss
 from wsm_model.model import WorldSlamModel
 from wsm_model.ranks import rank_and_world_size, sum_over_ranks, whole
@@ -36,7 +37,7 @@ class BatchSource(Protocol):
     def steps(self) -> int:
         """Steps of an epoch."""
 
-    def __iter__(self) -> Iterator[ClipBatch]: ...
+    def __iter__(self) -> Iterator[ClipBatch[Tensor]]: ...
 
     def state_dict(self) -> dict[str, Any]:
         """Where it stands, as JSON."""
@@ -155,7 +156,7 @@ def train(
 
 
 def train_step(
-    model: WorldSlamModel, optimiser: torch.optim.Optimizer, batch: ClipBatch, config: TrainingConfig
+    model: WorldSlamModel, optimiser: torch.optim.Optimizer, batch: ClipBatch[Tensor], config: TrainingConfig
 ) -> StepResult:
     """One step of the optimiser on this rank's share of a global batch.
 
@@ -204,8 +205,8 @@ def _backward(
     return dict(zip(names, values, strict=True))
 
 
-def _global_counts(batch: ClipBatch, device: torch.device) -> LossCounts:
-    own = loss_counts(spans_of(batch))
+def _global_counts(batch: ClipBatch[Tensor], device: torch.device) -> LossCounts:
+    own = loss_counts(batch.spans)
     dreamed, latents, sequences = sum_over_ranks([own.dreamed, own.latents, own.sequences], device)
     return LossCounts(dreamed=dreamed, latents=latents, sequences=sequences)
 
@@ -214,7 +215,7 @@ def _precision(precision: Precision, device: torch.device) -> AbstractContextMan
     return torch.autocast(device.type, torch.bfloat16, enabled=precision is Precision.BFLOAT16)
 
 
-def _not_finite(batch: ClipBatch, losses: Mapping[str, float], norm: float, bad: list[str]) -> str:
+def _not_finite(batch: ClipBatch[Tensor], losses: Mapping[str, float], norm: float, bad: list[str]) -> str:
     parts = [name for name, value in losses.items() if not math.isfinite(value)] or [f"gradient norm {norm}"]
     inputs = [name for name in ("rgb", "depth", "poses", "goal_camera0_m") if not _finite(getattr(batch, name))]
     cause = f"the batch itself holds NaN or infinity in {', '.join(inputs)}" if inputs else "the batch is finite"

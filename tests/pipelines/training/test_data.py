@@ -11,9 +11,10 @@ import pytest
 import torch
 
 from pipelines.training.config import HeldOutConfig, ModelChoice, TrainRunConfig
-from pipelines.training.data import held_out_loader, latent_standard, model_config, training_loader
+from pipelines.training.data import held_out_loader, model_config, training_loader
 from wsm_data.errors import ConfigError
 from wsm_data.loaders.config import OrderConfig, ReadConfig, Remainder, SourceConfig
+from wsm_data.shards.latent_standard import latent_standard
 from wsm_data.shards.manifest import ReleaseManifest, manifest_bytes
 from wsm_data.shards.statistics import LatentStatistics
 from wsm_model.config import Variant
@@ -91,21 +92,6 @@ def test_images_whose_latents_cannot_be_cut_into_patches_are_refused(run_config,
         model_config(run_config(), manifest(tiny, **size))
 
 
-def test_latents_are_standardised_by_the_release_where_the_codec_says_nothing(tiny):
-    found = latent_standard(tiny.manifest)
-    assert (found.codec, found.codec_digest) == ("dct", "c0dec")
-    assert (found.rgb_mean, found.rgb_std) == (tiny.manifest.rgb_statistics.mean, tiny.manifest.rgb_statistics.std)
-    assert found.depth_mean == tiny.manifest.depth_statistics.mean
-    assert found.depth_std == tiny.manifest.depth_statistics.std
-
-
-def test_statistics_of_the_codec_come_before_those_of_the_release(tiny):
-    mean, std = tuple(range(48)), (2.0,) * 48
-    found = latent_standard(manifest(tiny, codec=replace(tiny.codec, latent_mean=mean, latent_std=std)))
-    assert (found.rgb_mean, found.rgb_std) == (mean, std)
-    assert found.depth_mean == tiny.manifest.depth_statistics.mean
-
-
 def test_the_standard_is_what_the_loader_applies(run_config, tiny):
     """A batch times std plus mean is what is stored."""
     standard = latent_standard(tiny.manifest)
@@ -121,12 +107,6 @@ def test_the_standard_is_what_the_loader_applies(run_config, tiny):
         found = getattr(batch, name)[0] * scale + offset
         wanted = torch.tensor(getattr(clip, f"{name}_latent")).float()
         torch.testing.assert_close(found, wanted, rtol=1e-5, atol=1e-5)
-
-
-@pytest.mark.parametrize("statistics", ["rgb_statistics", "depth_statistics"])
-def test_a_release_without_statistics_has_no_standard(tiny, statistics):
-    with pytest.raises(ConfigError, match=r"release tiny must have latent statistics.*name a release with a split"):
-        latent_standard(manifest(tiny, **{statistics: NO_STATISTICS}))
 
 
 def test_held_out_clips_come_one_by_one_and_cut(run_config, tiny):

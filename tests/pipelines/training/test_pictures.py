@@ -11,15 +11,16 @@ import torch
 
 from pipelines.training import pictures as train_pictures
 from pipelines.training.config import HeldOutConfig, TrainRunConfig
-from pipelines.training.data import held_out_loader, latent_standard
+from pipelines.training.data import held_out_loader
 from pipelines.training.pictures import Decoding, draw_curves, draw_dream
 from wsm_data.codecs.dct import DctCodec
 from wsm_data.loaders.config import SourceConfig
 from wsm_data.schema.depth import DepthRange
+from wsm_data.schema.latent_standard import LatentStandard
+from wsm_data.shards.latent_standard import latent_standard
 from wsm_model.config import Variant
 from wsm_model.inference.session import SessionConfig
 from wsm_model.model import WorldSlamModel
-from wsm_model.model_file import LatentStandard
 from wsm_model.presets import preset
 
 CPU = torch.device("cpu")

@@ -78,7 +78,7 @@ def expected_batch() -> Callable[..., dict[str, np.ndarray]]:
 def _expected_batch(batch: Batch, clips: dict[str, Clip], row_latents: int = 0) -> dict[str, np.ndarray]:
     """The arrays of a batch with latents as they are stored, from where its sequences lie; one slot after the other."""
     rows = len(batch.rgb)
-    sequences = list(zip(batch.keys, *(getattr(batch, n).tolist() for n in ("row", "start", "lengths")), strict=True))
+    sequences = [(key, span.row, span.start, span.length) for key, span in zip(batch.keys, batch.spans, strict=True)]
     longest = row_latents or max([start + length for _, _, start, length in sequences], default=1)
     shape = next(iter(clips.values())).rgb_latent.shape[1:]
     expected = {

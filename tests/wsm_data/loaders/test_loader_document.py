@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 import torch
 
-from wsm_data.loaders.batches.batch import Batch, layout_of
+from wsm_data.loaders.batches.batch import layout_of
 from wsm_data.loaders.config import ReadConfig
+from wsm_data.schema.batch import ClipBatch
 
 ROOT = Path(__file__).parents[3]
 PAGE = (ROOT / "docs" / "loaders.md").read_text()
@@ -25,9 +26,9 @@ def _rows(heading: str) -> list[list[str]]:
 
 def test_every_field_of_a_batch_stands_in_the_table_in_order():
     named = [name for row in _rows("## Batches") for name in re.findall(r"`(\w+)`", row[0])]
-    in_text = [name for name in named if name in {field.name for field in fields(Batch)}]
+    in_text = [name for name in named if name in {field.name for field in fields(ClipBatch)}]
     assert in_text == named
-    assert set(named) == {field.name for field in fields(Batch)}
+    assert set(named) == {field.name for field in fields(ClipBatch)}
 
 
 def test_dtypes_in_the_table_are_those_of_the_tensors():

@@ -22,7 +22,7 @@ HARMLESS = [fault for fault in Fault if fault not in (Fault.FORBIDDEN, Fault.HAN
 
 def step_digest(batch):
     """Everything a training step sees."""
-    digest = hashlib.sha256(repr((batch.epoch, batch.step, batch.keys)).encode())
+    digest = hashlib.sha256(repr((batch.epoch, batch.step, batch.keys, batch.spans, batch.refs.tolist())).encode())
     for name in (
         "rgb",
         "depth",
@@ -31,8 +31,6 @@ def step_digest(batch):
         "still",
         "sequence_id",
         "goal_camera0_m",
-        "chunk_size",
-        "refs",
     ):
         digest.update(getattr(batch, name).contiguous().numpy().tobytes())
     return digest.hexdigest()

@@ -62,9 +62,8 @@ def test_a_query_is_a_prefix_of_its_clip_with_its_map(driven, arrangement):
             history = batch.history
             for n, key in enumerate(history.keys):
                 clip, replan, count = clips[key], int(batch.replan_latent[n]), count + 1
-                row, start = int(history.row[n]), int(history.start[n])
-                own = slice(start, start + replan + 1)
-                assert int(history.lengths[n]) == replan + 1
+                row, own = history.spans[n].place
+                assert history.spans[n].length == replan + 1
                 np.testing.assert_array_equal(history.rgb[row, own].numpy(), clip.rgb_latent[: replan + 1])
                 np.testing.assert_array_equal(history.depth[row, own].numpy(), clip.depth_latent[: replan + 1])
                 np.testing.assert_array_equal(history.goal_camera0_m[n].numpy(), clip.poses[-1, :3])

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wsm_data.schema.clip import MEMBERS, TEMPORAL_RATIO, UNREACHABLE_MM, Clip
+from wsm_data.schema.clip import MEMBERS, UNREACHABLE_MM, Clip
 
 
 def test_a_valid_clip_knows_its_lengths(clip_fields):
@@ -127,5 +127,4 @@ def test_the_member_table_is_the_one_of_the_format():
         "geodesic_mm": "uint16 YX",
         "expert_distance": "float32 T",
     }
-    assert TEMPORAL_RATIO == 4
     assert np.iinfo(MEMBERS["geodesic_mm"][0]).max == UNREACHABLE_MM

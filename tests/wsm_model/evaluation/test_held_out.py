@@ -2,6 +2,7 @@
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 import torch
 
@@ -12,7 +13,7 @@ CONFIG = SessionConfig(chunk_size=2, cache_latents=16)
 
 
 @pytest.fixture
-def batch(make_poses):
+def batch(make_poses, make_spans):
     torch.manual_seed(0)
     poses = make_poses(2, 5, 4)
     poses[:, 0] = torch.tensor([0.0, 0, 0, 1, 0, 0, 0])
@@ -21,12 +22,9 @@ def batch(make_poses):
         rgb=torch.randn(2, 5, 6, 4, 6),
         depth=torch.randn(2, 5, 6, 4, 6),
         poses=poses,
-        row=torch.arange(2),
-        start=torch.zeros(2, dtype=torch.int64),
-        lengths=torch.tensor([5, 4]),
-        chunk_size=torch.tensor([2, 2]),
+        spans=make_spans([5, 4], [2, 2]),
         goal_camera0_m=torch.randn(2, 3),
-        refs=torch.arange(2),
+        refs=np.arange(2),
         keys=("a", "b"),
         epoch=0,
         step=0,

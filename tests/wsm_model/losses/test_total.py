@@ -5,10 +5,10 @@ from dataclasses import replace
 import pytest
 import torch
 
+from wsm_data.schema.sequence import SequenceSpan
 from wsm_model.inputs import ModelInputs, ModelOutputs
 from wsm_model.losses.pose import pose_losses
-from wsm_model.losses.total import LossConfig, loss_counts, pretraining_loss
-from wsm_model.mot.chunks import SequenceSpan
+from wsm_model.losses.total import LossConfig, counted_frames, loss_counts, pretraining_loss
 
 SPANS = (
     SequenceSpan(row=0, start=0, length=6, chunk_size=2),
@@ -77,7 +77,7 @@ def test_the_weights_are_those_of_the_paper():
 def padding_filled(batch, value: float):
     """The same batch with a value in every frame of padding."""
     inputs, outputs, noise = batch
-    padding = inputs.table().sequence < 0
+    padding = inputs.table.sequence < 0
 
     def fill(tensor: torch.Tensor) -> torch.Tensor:
         filled = tensor.clone()
@@ -103,8 +103,7 @@ def test_gradients_reach_every_counted_frame_and_no_padding(batch):
     for prediction in (outputs.velocity, outputs.depth, outputs.poses):
         prediction.requires_grad_()
     pretraining_loss(*batch, PAPER).total.backward()
-    table = inputs.table()
-    real, dreamed = table.sequence >= 0, (table.sequence >= 0) & (table.latent > 0)
+    real, dreamed = counted_frames(inputs.table, torch.device("cpu"))
     for prediction, counted in ((outputs.velocity, dreamed), (outputs.depth, real), (outputs.poses, real)):
         assert torch.equal(prediction.grad.flatten(2).abs().amax(2) > 0, counted)
 

@@ -3,8 +3,8 @@
 import pytest
 import torch
 
+from wsm_data.schema.sequence import SequenceSpan, frame_table
 from wsm_model.mot.attention_blocks import plan_blocks
-from wsm_model.mot.chunks import SequenceSpan, frame_table
 from wsm_model.mot.mask import TokenKind, dense_mask
 
 CPU = torch.device("cpu")

@@ -3,9 +3,9 @@
 import pytest
 import torch
 
+from wsm_data.schema.sequence import SequenceSpan, frame_table
 from wsm_model.config import Variant
 from wsm_model.mot.attention_flex import block_mask, compiled
-from wsm_model.mot.chunks import SequenceSpan, frame_table
 from wsm_model.mot.mask import dense_mask
 
 CPU = torch.device("cpu")

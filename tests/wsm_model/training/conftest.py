@@ -5,9 +5,11 @@ from contextlib import suppress
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 import torch
 
+from wsm_data.schema.sequence import SequenceSpan
 from wsm_model.training.config import OptimiserConfig, Precision, TrainingConfig
 from wsm_model.training.schedule import make_optimiser
 from wsm_model.training.trainer import Hooks, resume, train
@@ -42,12 +44,12 @@ class RandomLoader:
             rgb=torch.randn(latents, generator=generator),
             depth=torch.randn(latents, generator=generator),
             poses=self._make_poses(ROWS, FRAMES, 4, generator=generator),
-            row=torch.arange(ROWS),
-            start=torch.zeros(ROWS, dtype=torch.int64),
-            lengths=torch.tensor([6, 5, 6, 3]),
-            chunk_size=torch.tensor([1, 2, 3, 4]),
+            spans=tuple(
+                SequenceSpan(row=row, start=0, length=length, chunk_size=1 + row)
+                for row, length in enumerate((6, 5, 6, 3))
+            ),
             goal_camera0_m=torch.randn(ROWS, 3, generator=generator),
-            refs=torch.arange(ROWS) + ROWS * step,
+            refs=np.arange(ROWS) + ROWS * step,
             keys=tuple(f"clip {step}/{row}" for row in range(ROWS)),
             epoch=0,
             step=step,

@@ -4,9 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wsm_data.codecs.base import TEMPORAL_RATIO, VideoCodec
+from wsm_data.codecs.base import VideoCodec
 from wsm_data.schema.arrays import Float16Array, Float32Array, Float64Array, Uint8Array, require_array
 from wsm_data.schema.clip import Clip
+from wsm_data.schema.sequence import TEMPORAL_RATIO
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

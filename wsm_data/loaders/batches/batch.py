@@ -9,21 +9,20 @@ from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from math import prod
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeAlias
 
 import torch
 
 from wsm_data.loaders.timing import Part
-from wsm_data.schema.clip import TEMPORAL_RATIO
+from wsm_data.schema.arrays import Int64Array
+from wsm_data.schema.batch import ClipBatch
+from wsm_data.schema.pose import POSE_VALUES
+from wsm_data.schema.sequence import POSE_SLOTS, SequenceSpan
 
-POSE_SLOTS = TEMPORAL_RATIO
-"""Pose slots of a latent: latent j >= 1 has those of its raw frames 4 j - 3 to 4 j, latent 0 the identity in each."""
+Batch: TypeAlias = ClipBatch[torch.Tensor]
 
 LATENT_TENSORS = ("rgb", "depth")
 """Tensors of a batch that hold latents."""
-
-NO_SEQUENCE = -1
-"""`sequence_id` of padding."""
 
 _ALIGNMENT_BYTES = 64
 
@@ -33,50 +32,6 @@ LATENT_DTYPES: Mapping[str, torch.dtype] = {
     "float16": torch.float16,
 }
 """Dtypes that the latents of a batch can have."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Batch:
-    """What one rank has of one global step: R rows of L latents, in which N sequences lie.
-
-    Padding is zero, and `sequence_id` is -1 there.
-
-    Attributes:
-        rgb: colour latents; [R, L, C, h, w].
-        depth: depth latents; [R, L, C, h, w].
-        depth_valid: share of pixels with a depth measurement, 0 to 255; uint8 [R, L, h, w].
-        poses: camera in the first camera's frame, x, y, z (m) and quaternion w, x, y, z; float32 [R, L, 4, 7]. Slot
-            m = 0..3 of latent j >= 1 is raw frame 4 (j - 1) + m + 1; latent 0 has the identity four times.
-        still: pose slots of still frames that were added at the end of a clip; bool [R, L, 4].
-        sequence_id: number of the sequence in the batch, -1 where there is none; int32 [R, L].
-        latent_index: number of the latent in its sequence; int32 [R, L].
-        row: row of each sequence; int64 [N].
-        start: its first latent in the row; int64 [N].
-        lengths: its latents; int64 [N].
-        chunk_size: its chunk size K; int64 [N].
-        goal_camera0_m: last camera position of the whole clip in the first camera's frame, m; float32 [N, 3].
-        refs: numbers of the clips over all sources; int64 [N].
-        keys: keys of the clips.
-        epoch: number of the epoch.
-        step: number of the global step in the epoch.
-    """
-
-    rgb: torch.Tensor
-    depth: torch.Tensor
-    depth_valid: torch.Tensor
-    poses: torch.Tensor
-    still: torch.Tensor
-    sequence_id: torch.Tensor
-    latent_index: torch.Tensor
-    row: torch.Tensor
-    start: torch.Tensor
-    lengths: torch.Tensor
-    chunk_size: torch.Tensor
-    goal_camera0_m: torch.Tensor
-    refs: torch.Tensor
-    keys: tuple[str, ...]
-    epoch: int
-    step: int
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,11 +82,10 @@ class BatchLayout:
             "rgb": (self.dtype, (*latents, *self.latent_shape)),
             "depth": (self.dtype, (*latents, *self.latent_shape)),
             "depth_valid": (torch.uint8, (*latents, height, width)),
-            "poses": (torch.float32, (*latents, POSE_SLOTS, 7)),
+            "poses": (torch.float32, (*latents, POSE_SLOTS, POSE_VALUES)),
             "still": (torch.bool, (*latents, POSE_SLOTS)),
             "sequence_id": (torch.int32, latents),
             "latent_index": (torch.int32, latents),
-            **dict.fromkeys(("row", "start", "lengths", "chunk_size", "refs"), (torch.int64, (self.sequences,))),
             "goal_camera0_m": (torch.float32, (self.sequences, 3)),
         }
         places: dict[str, TensorPlace] = {}
@@ -181,6 +135,8 @@ class PackedBatch:
     Attributes:
         block: the memory; uint8 [layout.size_bytes], on any device.
         layout: where each tensor lies in it.
+        spans: where each sequence lies in the batch.
+        refs: numbers of the clips; int64 [N].
         keys: keys of the clips.
         epoch: number of the epoch.
         step: number of the global step in the epoch.
@@ -189,6 +145,8 @@ class PackedBatch:
 
     block: torch.Tensor
     layout: BatchLayout
+    spans: tuple[SequenceSpan, ...]
+    refs: Int64Array
     keys: tuple[str, ...]
     epoch: int
     step: int
@@ -205,4 +163,6 @@ class PackedBatch:
 
     def unpacked(self) -> Batch:
         """The batch itself; all tensors are views of the block."""
-        return Batch(**self.tensors(), keys=self.keys, epoch=self.epoch, step=self.step)
+        return Batch(
+            **self.tensors(), spans=self.spans, refs=self.refs, keys=self.keys, epoch=self.epoch, step=self.step
+        )

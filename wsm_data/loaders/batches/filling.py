@@ -6,16 +6,17 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from wsm_data.loaders.batches.batch import LATENT_TENSORS, NO_SEQUENCE, POSE_SLOTS, BatchLayout, layout_of
-from wsm_data.loaders.order.epoch_order import EpochOrder
+from wsm_data.loaders.batches.batch import LATENT_TENSORS, BatchLayout, layout_of
+from wsm_data.loaders.order.epoch_order import EpochOrder, chunk_sizes
 from wsm_data.loaders.reading.clip_places import ClipPlace
 from wsm_data.loaders.reading.clip_reads import POSE_BYTES
+from wsm_data.schema.pose import IDENTITY_POSE, POSE_VALUES
+from wsm_data.schema.sequence import POSE_SLOTS, SequenceSpan, frame_table
 
 ANCHOR_SLOTS = POSE_SLOTS - 1
 """Slots of latent 0 that repeat the first pose: raw frame f of a clip lies in its slot `ANCHOR_SLOTS` + f."""
 
 _READ_TENSORS = ("rgb", "depth", "depth_valid", "poses")
-_IDENTITY = np.array([0, 0, 0, 1, 0, 0, 0], np.float32)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -24,15 +25,11 @@ class ArrangedClip:
 
     Attributes:
         place: where its clip is read.
-        row: its row.
-        start: its first latent in the row.
-        latents: latents that are taken: the clip, or a prefix of it.
+        span: where it lies in the batch: the clip, or a prefix of it.
     """
 
     place: ClipPlace
-    row: int
-    start: int
-    latents: int
+    span: SequenceSpan
 
 
 def arrange(rows: Sequence[np.ndarray], places: Sequence[ClipPlace], epoch_order: EpochOrder) -> list[ArrangedClip]:
@@ -41,14 +38,16 @@ def arrange(rows: Sequence[np.ndarray], places: Sequence[ClipPlace], epoch_order
     Args:
         rows: refs in each row; int64 [clips of the row].
         places: places of the clips of all rows.
-        epoch_order: says how many latents are taken of each clip.
+        epoch_order: says how many latents are taken of each clip, and its chunk size.
     """
     clips: list[ArrangedClip] = []
     for row, refs in enumerate(rows):
         start = 0
-        for latents in epoch_order.sequence_latents[refs].tolist():
-            clips.append(ArrangedClip(place=places[len(clips)], row=row, start=start, latents=latents))
-            start += latents
+        sizes = chunk_sizes(refs, epoch_order.config, epoch_order.epoch).tolist()
+        for latents, size in zip(epoch_order.sequence_latents[refs].tolist(), sizes, strict=True):
+            span = SequenceSpan(row=row, start=start, length=latents, chunk_size=size)
+            clips.append(ArrangedClip(place=places[len(clips)], span=span))
+            start = span.end
     return clips
 
 
@@ -60,7 +59,7 @@ def batch_layout(
     dtype: torch.dtype,
 ) -> BatchLayout:
     """The sizes of a batch: rows as long as the longest one, or of `row_latents` of joined clips; never empty."""
-    longest = max((clip.start + clip.latents for clip in clips), default=1)
+    longest = max((clip.span.end for clip in clips), default=1)
     return layout_of(rows, epoch_order.config.row_latents or longest, len(clips), latent_shape, dtype)
 
 
@@ -75,7 +74,8 @@ def slots_of(layout: BatchLayout, memory: memoryview, clip: ArrangedClip) -> dic
     Returns:
         By name of the tensor, the bytes from the clip's first latent to its last; for `poses`, from raw frame 0 on.
     """
-    slots = {name: memory[_stretch(layout, name, clip.row, clip.start, clip.latents)] for name in _READ_TENSORS}
+    span = clip.span
+    slots = {name: memory[_stretch(layout, name, span.row, span.start, span.length)] for name in _READ_TENSORS}
     slots["poses"] = slots["poses"][ANCHOR_SLOTS * POSE_BYTES :]
     return slots
 
@@ -84,40 +84,30 @@ def describe(
     layout: BatchLayout,
     memory: memoryview,
     clips: Sequence[ArrangedClip],
-    *,
-    refs: np.ndarray,
-    chunk_size: np.ndarray,
     goals: Sequence[np.ndarray],
 ) -> None:
-    """Fill in everything but what was read: masks, lengths, goals, anchors, and zeros where there is no clip.
+    """Fill in everything but what was read: masks, goals, anchors, and zeros where there is no clip.
 
     Args:
         layout: of the batch.
         memory: block of the batch, as bytes.
         clips: the clips of the batch.
-        refs: their refs; int64 [N].
-        chunk_size: chunk size of each; int64 [N].
         goals: last camera position of each, m; N of float32 [3].
     """
     arrays = {name: _array(layout, memory, name) for name in layout.tensors if name not in LATENT_TENSORS}
     by_slot = (layout.rows, POSE_SLOTS * layout.row_latents)
-    still, poses = arrays["still"].reshape(by_slot), arrays["poses"].reshape(*by_slot, 7)
-    still[:], arrays["sequence_id"][:], arrays["latent_index"][:] = False, NO_SEQUENCE, 0
+    still, poses = arrays["still"].reshape(by_slot), arrays["poses"].reshape(*by_slot, POSE_VALUES)
+    table = frame_table([clip.span for clip in clips], layout.rows, layout.row_latents)
+    still[:], arrays["sequence_id"][:], arrays["latent_index"][:] = False, table.sequence, table.latent
     used = [0] * layout.rows
-    for number, clip in enumerate(clips):
-        end = used[clip.row] = clip.start + clip.latents
-        arrays["sequence_id"][clip.row, clip.start : end] = number
-        arrays["latent_index"][clip.row, clip.start : end] = np.arange(clip.latents)
-        frame_0 = POSE_SLOTS * clip.start + ANCHOR_SLOTS
-        poses[clip.row, frame_0 - ANCHOR_SLOTS : frame_0] = _IDENTITY
+    for clip in clips:
+        row, frame_0 = clip.span.row, POSE_SLOTS * clip.span.start + ANCHOR_SLOTS
+        used[row] = clip.span.end
+        poses[row, frame_0 - ANCHOR_SLOTS : frame_0] = IDENTITY_POSE
         real_frames = clip.place.frames - clip.place.padded_frames
-        still[clip.row, frame_0 + real_frames : POSE_SLOTS * end] = True
+        still[row, frame_0 + real_frames : POSE_SLOTS * clip.span.end] = True
     for row, end in enumerate(used):
         _clear(layout, memory, row, end)
-    arrays["row"][:] = [clip.row for clip in clips]
-    arrays["start"][:] = [clip.start for clip in clips]
-    arrays["lengths"][:] = [clip.latents for clip in clips]
-    arrays["refs"][:], arrays["chunk_size"][:] = refs, chunk_size
     for number, goal in enumerate(goals):
         arrays["goal_camera0_m"][number] = goal
 

@@ -10,9 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from wsm_data.errors import ConfigError
+from wsm_data.shards.latent_standard import latent_standard
 from wsm_data.shards.manifest import ReleaseManifest
-from wsm_data.shards.statistics import LatentStatistics
 
 _SERIAL_ELEMENTS = 32_768
 """Torch splits longer operations among threads of its own (`at::internal::GRAIN_SIZE`), a pool of them for each thread
@@ -61,33 +60,18 @@ def convert(stored: torch.Tensor, out: torch.Tensor, standardisation: Standardis
 def standardisations(manifest: ReleaseManifest) -> Mapping[str, Standardisation]:
     """How `rgb` and `depth` latents of a release are standardised.
 
-    Depth by the statistics of the release. Colour by those of its codec, or by those of the release where the codec has
-    none of its own.
-
     Raises:
         ConfigError: the release has no statistics, for want of training clips.
     """
-    codec, measured = manifest.codec, manifest.rgb_statistics
-    has_own = bool(codec.latent_mean)
-    mean, std = (codec.latent_mean, codec.latent_std) if has_own else (measured.mean, measured.std)
+    standard = latent_standard(manifest)
     return {
-        "rgb": _standardisation(mean, std, manifest.name),
-        "depth": _standardisation(*_moments(manifest.depth_statistics), manifest.name),
+        "rgb": _standardisation(standard.rgb_mean, standard.rgb_std),
+        "depth": _standardisation(standard.depth_mean, standard.depth_std),
     }
 
 
-def _moments(statistics: LatentStatistics) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    return statistics.mean, statistics.std
-
-
-def _standardisation(mean: tuple[float, ...], std: tuple[float, ...], release: str) -> Standardisation:
-    if not mean or not std:
-        raise ConfigError(
-            f"the release {release} must have latent statistics to standardise by, but it has no training clips to "
-            "measure them on; set standardise = false, or name a release with a split `train` first"
-        )
-    scale = 1 / np.array(std, np.float64)
-    return Standardisation(mean=_column(np.array(mean)), scale=_column(scale))
+def _standardisation(mean: tuple[float, ...], std: tuple[float, ...]) -> Standardisation:
+    return Standardisation(mean=_column(np.array(mean)), scale=_column(1 / np.array(std, np.float64)))
 
 
 def _column(values: np.ndarray) -> torch.Tensor:

@@ -6,9 +6,10 @@ from dataclasses import replace
 import torch
 
 from wsm_data.errors import ConfigError
-from wsm_data.loaders.batches.batch import LATENT_DTYPES, NO_SEQUENCE, Batch, PackedBatch
+from wsm_data.loaders.batches.batch import LATENT_DTYPES, Batch, PackedBatch
 from wsm_data.loaders.batches.standardise import Standardisation, standardisations
 from wsm_data.loaders.config import ReadConfig
+from wsm_data.schema.sequence import NO_SEQUENCE
 from wsm_data.shards.manifest import ReleaseManifest
 
 

@@ -11,13 +11,14 @@ from wsm_data.access.local_shards import LocalShards
 from wsm_data.access.ranges import open_remote_store, read_exactly
 from wsm_data.files.fsspec_store import FsspecStore
 from wsm_data.files.stores import LocalStore
-from wsm_data.loaders.batches.batch import LATENT_TENSORS, POSE_SLOTS, Batch
+from wsm_data.loaders.batches.batch import LATENT_TENSORS, Batch
 from wsm_data.loaders.config import LoaderConfig, ReadConfig
 from wsm_data.loaders.doctor.diagnosis import LoaderRun, SourceFacts
 from wsm_data.loaders.loader import ClipLoader
 from wsm_data.loaders.reading.clip_places import ClipPlace, clip_places, span_of
 from wsm_data.loaders.reading.clip_reads import POSE_BYTES
 from wsm_data.loaders.sources.clips import Sources, SourceTable
+from wsm_data.schema.sequence import POSE_SLOTS
 
 _STORED_ITEM_BYTES = 2  # latents are stored as float16
 LIMIT_BYTES, LIMIT_S = 1 << 29, 2.0
@@ -46,13 +47,13 @@ def examine(
     start = time.perf_counter()
     with ClipLoader(replace(config, ledger=""), rank=0, world_size=ranks) as loader:
         stream = _endless(loader)
-        refs = [next(stream).refs.cpu().numpy()]
+        refs = [next(stream).refs]
         first_batch_s = time.perf_counter() - start
         before, start = loader.timing.seconds(), time.perf_counter()
         stored_bytes = 0
         while len(refs) <= batches and time.perf_counter() - start < seconds:
             batch = next(stream)
-            refs.append(batch.refs.cpu().numpy())
+            refs.append(batch.refs)
             stored_bytes += _stored_bytes(batch)
             del batch  # its memory is used again
             time.sleep(step_s)
@@ -103,7 +104,7 @@ def _stored_bytes(batch: Batch) -> int:
     """Bytes that the latents and poses of a batch take in the shards."""
     channels, height, width = batch.rgb.shape[2:]
     of_cells = (len(LATENT_TENSORS) * channels * _STORED_ITEM_BYTES + 1) * height * width
-    return int(batch.lengths.sum()) * (of_cells + POSE_SLOTS * POSE_BYTES)
+    return sum(span.length for span in batch.spans) * (of_cells + POSE_SLOTS * POSE_BYTES)
 
 
 def _read_rate(sources: Sources, places: Sequence[ClipPlace], read: ReadConfig) -> float:

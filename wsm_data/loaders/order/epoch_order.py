@@ -11,7 +11,8 @@ from wsm_data.loaders.config import Arrangement, OrderConfig
 from wsm_data.loaders.order.lanes import EMPTY_ROW, bucket_lanes, deal_lanes
 from wsm_data.loaders.order.mixing import mixed_refs
 from wsm_data.loaders.order.pass_order import Int32Array, SourceLayout
-from wsm_data.loaders.order.stable_hash import Draw, Int64Array, mix64
+from wsm_data.loaders.order.stable_hash import Draw, mix64
+from wsm_data.schema.arrays import Int64Array
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,7 +4,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from wsm_data.loaders.order.stable_hash import Int64Array
+from wsm_data.schema.arrays import Int64Array
 
 
 def join_rows(lengths: NDArray[np.integer], *, row_latents: int, pool: int) -> tuple[Int64Array, Int64Array]:

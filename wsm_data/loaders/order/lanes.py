@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wsm_data.loaders.config import OrderConfig, Remainder
-from wsm_data.loaders.order.stable_hash import Draw, Int64Array, mix64, permutation
+from wsm_data.loaders.order.stable_hash import Draw, mix64, permutation
+from wsm_data.schema.arrays import Int64Array
 
 EMPTY_ROW = -1
 """In place of the number of a row: the slot stays empty."""

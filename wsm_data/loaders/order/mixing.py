@@ -7,7 +7,7 @@ import numpy as np
 
 from wsm_data.loaders.config import OrderConfig
 from wsm_data.loaders.order.pass_order import SourceLayout, pass_order
-from wsm_data.loaders.order.stable_hash import Int64Array
+from wsm_data.schema.arrays import Int64Array
 
 
 def mixed_refs(layouts: Sequence[SourceLayout], order: OrderConfig, epoch: int) -> Int64Array:

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wsm_data.loaders.config import OrderConfig
-from wsm_data.loaders.order.stable_hash import Draw, Int64Array, mix64, permutation
+from wsm_data.loaders.order.stable_hash import Draw, mix64, permutation
+from wsm_data.schema.arrays import Int64Array
 
 Int32Array = NDArray[np.int32]
 

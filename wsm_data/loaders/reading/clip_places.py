@@ -7,7 +7,7 @@ import numpy as np
 
 from wsm_data.access.shard_reader import Span
 from wsm_data.loaders.sources.clips import Sources
-from wsm_data.schema.clip import TEMPORAL_RATIO
+from wsm_data.schema.sequence import frames_of
 
 READ_MEMBERS = ("rgb_latent", "depth_latent", "depth_valid", "poses")
 """Members that batches are made of, in stored order."""
@@ -62,11 +62,6 @@ class ClipPlace:
         """Bytes in front of each member: padding of the one before, and headers."""
         ends = (self.clip_offset, *map(add, self.offsets, self.sizes))
         return tuple(map(sub, self.offsets, ends))
-
-
-def frames_of(latents: int) -> int:
-    """Raw frames of so many latents."""
-    return 1 + TEMPORAL_RATIO * (latents - 1)
 
 
 def clip_places(sources: Sources, refs: np.ndarray) -> list[ClipPlace]:

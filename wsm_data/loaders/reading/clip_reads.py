@@ -15,8 +15,9 @@ import xxhash
 from wsm_data.access.clip_reader import read_until_whole, wrong_checksum, wrong_header
 from wsm_data.access.shard_reader import ShardReader
 from wsm_data.errors import IntegrityError
-from wsm_data.loaders.reading.clip_places import READ_MEMBERS, ClipPlace, frames_of
+from wsm_data.loaders.reading.clip_places import READ_MEMBERS, ClipPlace
 from wsm_data.loaders.timing import Part, Stopwatch
+from wsm_data.schema.sequence import frames_of
 from wsm_data.shards.members import STORED_DTYPES, array_header, shape_of
 from wsm_data.shards.names import INDEX_NAME
 from wsm_data.shards.tar_format import NPY_HEADER_BYTES, padded

@@ -19,7 +19,7 @@ from wsm_data.loaders.batches.buffers import BufferPool, allocator
 from wsm_data.loaders.batches.filling import ArrangedClip, arrange, batch_layout, describe, slots_of
 from wsm_data.loaders.batches.standardise import convert, standardisations
 from wsm_data.loaders.config import ReadConfig
-from wsm_data.loaders.order.epoch_order import EpochOrder, chunk_sizes
+from wsm_data.loaders.order.epoch_order import EpochOrder
 from wsm_data.loaders.reading.clip_places import clip_places, span_of
 from wsm_data.loaders.reading.clip_reads import read_clip
 from wsm_data.loaders.reading.prefetch import done_alone
@@ -112,6 +112,8 @@ class StepReader:
             packed = PackedBatch(
                 block=self._pool.take(layout.size_bytes),
                 layout=layout,
+                spans=tuple(clip.span for clip in clips),
+                refs=refs,
                 keys=tuple(clip.place.key for clip in clips),
                 epoch=epoch_order.epoch,
                 step=step,
@@ -119,8 +121,6 @@ class StepReader:
             work = StepWork(
                 packed=packed,
                 clips=clips,
-                refs=refs,
-                chunk_size=chunk_sizes(refs, epoch_order.config, epoch_order.epoch),
                 memory=memoryview(packed.block.numpy()),
                 targets=packed.tensors() if self._converts else {},
                 read_clip=self._read_clip,
@@ -146,13 +146,13 @@ class StepReader:
             self._verification.passed(place.source, place.number)
         for name, latents in staged.items():
             with watch.measure(Part.COLLATE):
-                out = work.targets[name][clip.row, clip.start : clip.start + clip.latents]
+                out = work.targets[name][clip.span.place]
                 convert(latents, out, self._standardise.get(name))
         return last_pose[:3]
 
     def _staged(self, clip: ArrangedClip) -> dict[str, torch.Tensor]:
         """Memory of this thread for the stored latents of a clip; it stays in the cache from clip to clip."""
-        shape = (len(LATENT_TENSORS), clip.latents, *self._latent_shape)
+        shape = (len(LATENT_TENSORS), clip.span.length, *self._latent_shape)
         size = int(np.prod(shape))
         held = getattr(self._staging, "held", None)
         if held is None or len(held) < size:
@@ -167,8 +167,6 @@ class StepWork:
     Attributes:
         packed: the batch to be.
         clips: what is read into it.
-        refs: numbers of the clips; int64 [N].
-        chunk_size: chunk size of each; int64 [N].
         memory: block of the batch, as bytes.
         targets: tensors of the batch by name, where what is read is not yet what is delivered.
         read_clip: reads a clip into this; gives the last camera position.
@@ -178,8 +176,6 @@ class StepWork:
 
     packed: PackedBatch
     clips: Sequence[ArrangedClip]
-    refs: np.ndarray
-    chunk_size: np.ndarray
     memory: memoryview
     targets: Mapping[str, torch.Tensor]
     read_clip: "Callable[[StepWork, ArrangedClip, Stopwatch], np.ndarray]"
@@ -209,7 +205,7 @@ class StepWork:
         with watch.measure(Part.COLLATE):
             goals = [self.goals[part] for part in range(self.parts)]
             layout, packed = self.packed.layout, self.packed
-            describe(layout, self.memory, self.clips, refs=self.refs, chunk_size=self.chunk_size, goals=goals)
+            describe(layout, self.memory, self.clips, goals)
         return replace(packed, seconds=total_seconds([*self.watches, watch]))
 
 

@@ -18,7 +18,7 @@ from wsm_data.files.digest import sha256_bytes
 from wsm_data.loaders.config import OrderConfig, SourceConfig
 from wsm_data.loaders.order.epoch_order import EpochOrder, order_epoch
 from wsm_data.loaders.order.pass_order import SourceLayout
-from wsm_data.loaders.order.stable_hash import Int64Array
+from wsm_data.schema.arrays import Int64Array
 from wsm_data.shards.index_row import IndexRow
 from wsm_data.shards.selection import read_selection
 

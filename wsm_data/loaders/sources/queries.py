@@ -16,9 +16,10 @@ from wsm_data.errors import ConfigError
 from wsm_data.loaders.config import MAX_CHUNK_LATENTS, OrderConfig, SourceConfig
 from wsm_data.loaders.order.epoch_order import EpochOrder, order_epoch
 from wsm_data.loaders.order.pass_order import Int32Array
-from wsm_data.loaders.order.stable_hash import Draw, Int64Array, mix64
+from wsm_data.loaders.order.stable_hash import Draw, mix64
 from wsm_data.loaders.sources.clips import Sources, SourceTable, open_sources
-from wsm_data.schema.clip import TEMPORAL_RATIO
+from wsm_data.schema.arrays import Int64Array
+from wsm_data.schema.sequence import TEMPORAL_RATIO
 
 _LOG = logging.getLogger(__name__)
 _FIRST_REPLAN_LATENT = 1  # latent 0 is the anchor: before it is left nothing has moved

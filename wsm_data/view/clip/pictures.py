@@ -9,7 +9,8 @@ from wsm_data.codecs.base import VideoCodec
 from wsm_data.codecs.depth import depth_m_from_latent_video
 from wsm_data.errors import ConfigError
 from wsm_data.schema.arrays import BoolArray, Float32Array, Float64Array, Uint8Array, require_array
-from wsm_data.schema.clip import TEMPORAL_RATIO, Clip
+from wsm_data.schema.clip import Clip
+from wsm_data.schema.sequence import TEMPORAL_RATIO
 from wsm_data.view.drawing.depth_colours import depth_picture
 
 

@@ -1,13 +1,16 @@
 import pickle
 from itertools import pairwise
 
+import numpy as np
 import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
 from wsm_data.loaders.batches.batch import LATENT_DTYPES, PackedBatch, layout_of
+from wsm_data.schema.sequence import SequenceSpan
 
+SPAN = SequenceSpan(row=0, start=0, length=1, chunk_size=4)
 sizes = st.integers(1, 5)
 layouts = st.builds(
     layout_of,
@@ -21,7 +24,7 @@ layouts = st.builds(
 
 def _packed(layout, fill: int = 0) -> PackedBatch:
     block = torch.full((layout.size_bytes,), fill, dtype=torch.uint8)
-    return PackedBatch(block=block, layout=layout, keys=("a/b/c",), epoch=2, step=7)
+    return PackedBatch(block=block, layout=layout, spans=(SPAN,), refs=np.array([5]), keys=("a/b/c",), epoch=2, step=7)
 
 
 @given(layouts)
@@ -43,11 +46,9 @@ def test_each_tensor_has_its_shape_and_dtype_and_is_contiguous(layout):
     assert (batch.still.shape, batch.still.dtype) == ((rows, latents, 4), torch.bool)
     for name in ("sequence_id", "latent_index"):
         assert (getattr(batch, name).shape, getattr(batch, name).dtype) == ((rows, latents), torch.int32)
-    for name in ("row", "start", "lengths", "chunk_size", "refs"):
-        assert (getattr(batch, name).shape, getattr(batch, name).dtype) == ((layout.sequences,), torch.int64)
     assert (batch.goal_camera0_m.shape, batch.goal_camera0_m.dtype) == ((layout.sequences, 3), torch.float32)
     assert all(tensor.is_contiguous() for tensor in vars(batch).values() if isinstance(tensor, torch.Tensor))
-    assert (batch.keys, batch.epoch, batch.step) == (("a/b/c",), 2, 7)
+    assert (batch.spans, batch.refs.tolist(), batch.keys, batch.epoch, batch.step) == ((SPAN,), [5], ("a/b/c",), 2, 7)
 
 
 def test_what_is_written_to_one_tensor_is_in_no_other():
@@ -64,4 +65,5 @@ def test_a_packed_batch_crosses_to_another_process_as_one_block(dtype):
     copy = pickle.loads(pickle.dumps(packed))  # noqa: S301
     assert torch.equal(copy.block, packed.block)
     assert (copy.layout, copy.keys, copy.epoch, copy.step) == (packed.layout, packed.keys, packed.epoch, packed.step)
+    assert (copy.spans, copy.refs.tolist()) == (packed.spans, [5])
     assert copy.layout.tensors == packed.layout.tensors

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 import torch
+from wsm_data.loaders.order.epoch_plan import chunk_sizes
 
 from wsm_data.loaders.batches.batch import PackedBatch
 from wsm_data.loaders.batches.filling import arrange, batch_layout, describe, slots_of
@@ -39,9 +40,9 @@ def test_the_clips_of_a_row_lie_one_behind_the_other(order_of, settings):
         assert [clip.place.key for clip in clips] == sources.keys(np.concatenate(rows))
         ends = dict.fromkeys(range(len(rows)), 0)
         for clip in clips:
-            assert clip.start == ends[clip.row]
-            assert clip.latents == min(clip.place.latents, settings.get("max_latents", 99))
-            ends[clip.row] += clip.latents
+            assert clip.span.start == ends[clip.span.row]
+            assert clip.span.length == min(clip.place.latents, settings.get("max_latents", 99))
+            ends[clip.span.row] += clip.span.length
         assert layout.row_latents == (settings.get("row_latents") or max(ends.values()))
         assert (layout.rows, layout.sequences) == (len(rows), len(clips))
 
@@ -52,7 +53,13 @@ def test_slots_of_different_clips_and_tensors_lie_apart(order_of):
     _, clips, layout = _arranged(sources, epoch_order)
     assert len(clips) > 2
     packed = PackedBatch(
-        block=torch.zeros(layout.size_bytes, dtype=torch.uint8), layout=layout, keys=(), epoch=0, step=0
+        block=torch.zeros(layout.size_bytes, dtype=torch.uint8),
+        layout=layout,
+        spans=(),
+        refs=np.arange(0),
+        keys=(),
+        epoch=0,
+        step=0,
     )
     memory = memoryview(packed.block.numpy())
     for clip in clips:
@@ -62,7 +69,7 @@ def test_slots_of_different_clips_and_tensors_lie_apart(order_of):
             written = packed.block.numpy().sum()
             assert written == slot.nbytes
             values = packed.tensors()[name]
-            own = values[clip.row, clip.start : clip.start + clip.latents]
+            own = values[clip.span.place]
             own = own.flatten(0, 1)[3:] if name == "poses" else own
             assert own.contiguous().view(torch.uint8).sum() == written
             slot[:] = bytes(slot.nbytes)
@@ -75,19 +82,19 @@ def test_describing_says_all_that_is_not_read_whatever_the_memory_held_before(or
         rows, clips, layout = _arranged(sources, epoch_order, step)
         block = torch.full((layout.size_bytes,), 255, dtype=torch.uint8)
         keys = tuple(clip.place.key for clip in clips)
-        refs, drawn = np.concatenate(rows), np.arange(len(clips))
+        refs, spans = np.concatenate(rows), tuple(clip.span for clip in clips)
         goals = [released.clips[key].poses[-1, :3] for key in keys]
-        describe(layout, memoryview(block.numpy()), clips, refs=refs, chunk_size=drawn, goals=goals)
-        batch = PackedBatch(block=block, layout=layout, keys=keys, epoch=0, step=step).unpacked()
+        describe(layout, memoryview(block.numpy()), clips, goals)
+        known = {"spans": spans, "refs": refs, "keys": keys, "epoch": 0, "step": step}
+        batch = PackedBatch(block=block, layout=layout, **known).unpacked()
         expected = expected_batch(batch, released.clips, row_latents=7)
         for name in ("still", "sequence_id", "latent_index", "goal_camera0_m"):
             np.testing.assert_array_equal(getattr(batch, name), expected[name], err_msg=name)
-        assert batch.refs.tolist() == refs.tolist()
-        assert batch.chunk_size.tolist() == drawn.tolist()
+        assert [span.chunk_size for span in spans] == chunk_sizes(refs, plan.order, plan.epoch).tolist()
         padding = batch.sequence_id < 0
         padded += int(padding.sum())
         for values in (batch.rgb, batch.depth, batch.depth_valid, batch.poses):
             assert not values[padding].any()
         for clip in clips:
-            assert batch.poses[clip.row, clip.start, :3].tolist() == [[0, 0, 0, 1, 0, 0, 0]] * 3
+            assert batch.poses[clip.span.row, clip.span.start, :3].tolist() == [[0, 0, 0, 1, 0, 0, 0]] * 3
     assert padded

@@ -1,5 +1,6 @@
 from dataclasses import replace
 
+import numpy as np
 import pytest
 import torch
 
@@ -18,7 +19,8 @@ def packed() -> PackedBatch:
     """Three rows of four latents, as they are stored."""
     layout = layout_of(3, 4, 2, (48, 6, 10), torch.float16)
     block = torch.zeros(layout.size_bytes, dtype=torch.uint8)
-    packed = PackedBatch(block=block, layout=layout, keys=("a", "b"), epoch=1, step=2)
+    known = {"spans": (), "refs": np.arange(2), "keys": ("a", "b"), "epoch": 1, "step": 2}
+    packed = PackedBatch(block=block, layout=layout, **known)
     generator = torch.Generator().manual_seed(0)
     for name in ("rgb", "depth", "poses"):
         tensor = packed.tensors()[name]

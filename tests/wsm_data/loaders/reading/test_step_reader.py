@@ -51,11 +51,11 @@ def test_rows_are_those_of_the_order(released, make_loader):
     for batch in loader:
         rows = epoch_order.rows(batch.step, 0, 1)
         assert batch.refs.tolist() == np.concatenate(rows).tolist()
-        assert batch.row.tolist() == [row for row, refs in enumerate(rows) for _ in refs]
-        assert batch.keys == tuple(loader.sources.keys(batch.refs.numpy()))
-        assert (
-            batch.chunk_size.tolist() == chunk_sizes(batch.refs.numpy(), epoch_order.config, epoch_order.epoch).tolist()
-        )
+        assert [span.row for span in batch.spans] == [row for row, refs in enumerate(rows) for _ in refs]
+        assert batch.keys == tuple(loader.sources.keys(batch.refs))
+        assert [span.chunk_size for span in batch.spans] == chunk_sizes(
+            batch.refs, epoch_order.config, epoch_order.epoch
+        ).tolist()
         assert batch.epoch == epoch_order.epoch == 0
 
 

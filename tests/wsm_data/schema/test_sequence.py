@@ -1,17 +1,23 @@
-"""Chunks and where sequences stand."""
-
+import numpy as np
 import pytest
-import torch
 
-from wsm_model.mot.chunks import SequenceSpan, chunk_bounds, chunk_numbers, frame_table
+from wsm_data.schema.sequence import (
+    SequenceSpan,
+    chunk_bounds,
+    chunk_numbers,
+    chunk_start,
+    frame_table,
+    frames_of,
+)
 
 
 @pytest.mark.parametrize("chunk_size", [1, 2, 3, 4])
 @pytest.mark.parametrize("length", [1, 2, 5, 9])
 def test_numbers_and_bounds_tell_the_same_chunks(length, chunk_size):
-    numbers = chunk_numbers(torch.arange(length), torch.tensor(chunk_size)).tolist()
+    numbers = chunk_numbers(length, chunk_size).tolist()
     bounds = chunk_bounds(length, chunk_size)
     assert numbers == [number for number, (first, end) in enumerate(bounds) for _ in range(first, end)]
+    assert [chunk_start(latent, chunk_size) for latent in range(length)] == [bounds[number][0] for number in numbers]
     assert bounds[0] == (0, 1)
     assert all(end - first == chunk_size for first, end in bounds[1:-1])
 
@@ -39,3 +45,18 @@ def test_a_table_says_sequence_latent_and_chunk_of_every_frame():
 def test_sequences_that_do_not_fit_are_refused(spans):
     with pytest.raises(ValueError, match="must have a place of its own"):
         frame_table(spans, 1, 5)
+
+
+def test_a_later_latent_covers_four_frames():
+    assert [frames_of(latents) for latents in (1, 2, 3)] == [1, 5, 9]
+
+
+def test_the_place_of_a_sequence_picks_it_out_of_an_array():
+    rows = np.arange(12).reshape(2, 6)
+    assert rows[SequenceSpan(row=1, start=2, length=3, chunk_size=1).place].tolist() == [8, 9, 10]
+
+
+@pytest.mark.parametrize("changes", [{"length": 0}, {"chunk_size": 0}, {"row": -1}, {"start": -1}], ids=str)
+def test_a_sequence_without_a_place_or_a_length_is_refused(changes):
+    with pytest.raises(ValueError, match="needs a place, a length and a chunk size"):
+        SequenceSpan(**({"row": 0, "start": 0, "length": 1, "chunk_size": 1} | changes))
