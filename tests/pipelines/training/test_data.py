@@ -116,8 +116,8 @@ def test_held_out_clips_come_one_by_one_and_cut(run_config, tiny):
     test_keys = sorted(clip.meta.key for clip in tiny.clips[-2:])
     assert sorted(key for batch in batches for key in batch.keys) == test_keys
     assert [len(batch.keys) for batch in batches] == [1, 1]
-    assert all(batch.lengths.tolist() == [2] for batch in batches)
-    assert all(batch.chunk_size.tolist() == [4] for batch in batches)
+    assert all([span.length for span in batch.spans] == [2] for batch in batches)
+    assert all([span.chunk_size for span in batch.spans] == [4] for batch in batches)
 
 
 def test_a_split_without_clips_holds_nothing_out_and_says_so(run_config, caplog):

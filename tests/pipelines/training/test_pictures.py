@@ -65,7 +65,7 @@ def drawn(tiny, tmp_path, monkeypatch):
         shape = replace(preset("tiny", latent_height=6, latent_width=10, variant=variant), layers=1)
         config = TrainRunConfig(sources=(SourceConfig(release=str(tiny.folder)),), held_out=HELD_OUT)
         with held_out_loader(config, CPU) as loader:
-            batch = max(loader, key=lambda one: int(one.lengths[0]))
+            batch = max(loader, key=lambda one: one.spans[0].length)
         decoding = Decoding(
             codec=DctCodec(), standard=latent_standard(tiny.manifest), depth_range=tiny.manifest.depth_range
         )
@@ -89,7 +89,7 @@ def true_path_m(batch, latents: int) -> np.ndarray:
 
 def test_the_dream_follows_the_half_that_is_seen(drawn):
     found = drawn()
-    assert int(found.batch.lengths[0]) == 5  # two latents are seen, a chunk of two is dreamed
+    assert found.batch.spans[0].length == 5  # two latents are seen, a chunk of two is dreamed
     sheet = found.sheet
     assert sheet.title == f"after step 3: {found.batch.keys[0]}, 5 frames seen, 8 dreamed"
     assert min(sheet.frames) >= 5
