@@ -15,6 +15,7 @@ import dataclasses
 import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -36,9 +37,10 @@ from wsm_model.model import WorldSlamModel
 from wsm_model.model_file import ModelCard, load_model, save_model
 from wsm_model.ranks import leave_ranks, rank_and_world_size, shard_model, start_ranks, unsharded, wait_for_all
 from wsm_model.training.checkpoint import checkpoints
+from wsm_model.training.loop import Hooks, TrainingRun, resume, total_steps, train
 from wsm_model.training.metrics import metrics_writer
+from wsm_model.training.pretraining import pretraining_step
 from wsm_model.training.schedule import make_optimiser
-from wsm_model.training.trainer import Hooks, resume, total_steps, train
 from wsm_model.weights.from_wan import load_wan_weights
 
 _NOT_PART_OF_A_RUN = ("checkpoint_every", "keep_checkpoints", "log_every", "sample_every", "micro_rows")
@@ -92,22 +94,21 @@ def _run(config: TrainRunConfig, out: Path, device: torch.device, quiet: bool) -
         if config.model.weights and not checkpoints(out / "checkpoints"):
             _fill_with_wan(config, out, model)
         shard_model(model, device)
-        optimiser = make_optimiser(model, config.training.optimiser)
-        done = resume(out / "checkpoints", model, optimiser, loader, identity)
+        run = TrainingRun(
+            model=model,
+            optimiser=make_optimiser(model, config.training.optimiser),
+            folder=out / "checkpoints",
+            identity=identity,
+        )
+        done = resume(run, loader)
         if rank == 0:  # only now is it certain that the folder is this run's
             out.mkdir(parents=True, exist_ok=True)
             write_text(out / "run.json", json.dumps(dataclasses.asdict(config), indent=1, sort_keys=True) + "\n")
         with _hooks(config, out, model, done, total_steps(config.training, loader), device, quiet) as hooks:
-            train(
-                model,
-                loader,
-                config.training,
-                folder=out / "checkpoints",
-                identity=identity,
-                hooks=hooks,
-                optimiser=optimiser,
-                done=done,
-            )
+            model.checkpoint_activations = config.training.checkpoint_activations
+            model.train()
+            step = partial(pretraining_step, model, run, config.training)
+            train(run, step, loader, config.training, hooks=hooks, done=done)
         card = ModelCard(
             config=model.config,
             standard=latent_standard(release.manifest),

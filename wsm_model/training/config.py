@@ -58,21 +58,13 @@ class OptimiserConfig:
 
 
 @dataclass(frozen=True, kw_only=True)
-class TrainingConfig:
-    """How a model is trained.
+class LoopConfig:
+    """How long a run trains, how fast, and how often it tells and keeps where it stands.
 
     Attributes:
         epochs: passes over the data.
         max_steps: end after this many optimiser steps; 0: after `epochs`. The schedule ends where training ends.
-        micro_rows: rows of a rank's step that are passed at once; gradients of the parts are accumulated. 0: all.
-        seed: of initial weights, noise and flow times.
-        precision: arithmetic of matrix products.
-        checkpoint_activations: recompute each layer in the backward pass instead of keeping what is inside it.
-        depth_noise: largest share s of noise eps in the depth latents d that later chunks see: of each sequence a
-            share is drawn uniformly up to it, and they see (1 - s) d + s eps. In use they see estimates, which are not
-            the truth (paper silent; 0: the truth, its teacher forcing).
         optimiser: learning rate and moments.
-        loss: weights of the parts.
         checkpoint_every: optimiser steps between checkpoints; there is one at the end in any case.
         keep_checkpoints: how many of the latest stay on disk.
         log_every: optimiser steps between lines of metrics.
@@ -81,13 +73,7 @@ class TrainingConfig:
 
     epochs: int = 10
     max_steps: int = 0
-    micro_rows: int = 0
-    seed: int = 0
-    precision: Precision = Precision.BFLOAT16
-    checkpoint_activations: bool = False
-    depth_noise: float = 0.0
     optimiser: OptimiserConfig = field(default_factory=OptimiserConfig)
-    loss: LossConfig = field(default_factory=LossConfig)
     checkpoint_every: int = 500
     keep_checkpoints: int = 2
     log_every: int = 1
@@ -97,8 +83,37 @@ class TrainingConfig:
         for name in ("epochs", "checkpoint_every", "keep_checkpoints", "log_every"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} must be at least 1, found {getattr(self, name)}")
+        for name in ("max_steps", "sample_every"):
+            if getattr(self, name) < 0:
+                raise ValueError(f"{name} must not be negative, found {getattr(self, name)}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainingConfig(LoopConfig):
+    """How a model is pretrained.
+
+    Attributes:
+        micro_rows: rows of a rank's step that are passed at once; gradients of the parts are accumulated. 0: all.
+        seed: of initial weights, noise and flow times.
+        precision: arithmetic of matrix products.
+        checkpoint_activations: recompute each layer in the backward pass instead of keeping what is inside it.
+        depth_noise: largest share s of noise eps in the depth latents d that later chunks see: of each sequence a
+            share is drawn uniformly up to it, and they see (1 - s) d + s eps. In use they see estimates, which are not
+            the truth (paper silent; 0: the truth, its teacher forcing).
+        loss: weights of the parts.
+    """
+
+    micro_rows: int = 0
+    seed: int = 0
+    precision: Precision = Precision.BFLOAT16
+    checkpoint_activations: bool = False
+    depth_noise: float = 0.0
+    loss: LossConfig = field(default_factory=LossConfig)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
         if not 0 <= self.depth_noise <= 1:
             raise ValueError(f"depth_noise must lie in [0, 1], found {self.depth_noise}")
-        for name in ("max_steps", "micro_rows", "sample_every", "seed"):
+        for name in ("micro_rows", "seed"):
             if getattr(self, name) < 0:
                 raise ValueError(f"{name} must not be negative, found {getattr(self, name)}")

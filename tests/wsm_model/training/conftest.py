@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -11,8 +12,9 @@ import torch
 
 from wsm_data.schema.sequence import SequenceSpan
 from wsm_model.training.config import OptimiserConfig, Precision, TrainingConfig
+from wsm_model.training.loop import Hooks, TrainingRun, resume, train
+from wsm_model.training.pretraining import pretraining_step
 from wsm_model.training.schedule import make_optimiser
-from wsm_model.training.trainer import Hooks, resume, train
 
 ROWS, FRAMES = 4, 6
 
@@ -86,9 +88,13 @@ def run(make_model, make_loader):
 
     def train_in(folder: Path, config: TrainingConfig, *, kill_after: int = 0, spoil=None, identity=None):
         model, loader = make_model(), make_loader(spoil)
-        optimiser = make_optimiser(model, config.optimiser)
-        identity = identity or {"model": "small"}
-        done = resume(folder, model, optimiser, loader, identity)
+        own = TrainingRun(
+            model=model,
+            optimiser=make_optimiser(model, config.optimiser),
+            folder=folder,
+            identity=identity or {"model": "small"},
+        )
+        done = resume(own, loader)
         lines: list[dict[str, float]] = []
 
         def metrics(step: int, values: dict[str, float]) -> None:
@@ -98,7 +104,7 @@ def run(make_model, make_loader):
 
         hooks = Hooks(metrics=metrics, sample=lambda _step: None, progress=lambda _done: None)
         with suppress(Stop):
-            train(model, loader, config, folder=folder, identity=identity, hooks=hooks, optimiser=optimiser, done=done)
+            train(own, partial(pretraining_step, model, own, config), loader, config, hooks=hooks, done=done)
         return model, lines
 
     return train_in

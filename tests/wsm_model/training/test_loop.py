@@ -1,0 +1,80 @@
+"""The loop with a step that is not pretraining's."""
+
+import pytest
+import torch
+
+from wsm_data.errors import NumericalError
+from wsm_model.training.checkpoint import checkpoints
+from wsm_model.training.config import LoopConfig, OptimiserConfig
+from wsm_model.training.loop import Hooks, StepResult, TrainingRun, finish_step, resume, train
+
+CONFIG = LoopConfig(
+    max_steps=5,
+    checkpoint_every=2,
+    sample_every=2,
+    log_every=2,
+    optimiser=OptimiserConfig(learning_rate=1e-2, final_learning_rate=1e-2),
+)
+
+
+class Numbers:
+    """An endless epoch of the numbers of its steps."""
+
+    def __init__(self):
+        self.steps, self.step = 1000, 0
+
+    def __iter__(self):
+        while self.step < self.steps:
+            self.step += 1
+            yield self.step
+
+    def state_dict(self):
+        return {"step": self.step}
+
+    def load_state_dict(self, state):
+        self.step = state["step"]
+
+
+def run_of(folder) -> TrainingRun:
+    torch.manual_seed(0)
+    model = torch.nn.Linear(3, 1)
+    groups = [{"params": list(model.parameters()), "learning_rate_factor": 1.0}]
+    return TrainingRun(model=model, optimiser=torch.optim.AdamW(groups), folder=folder, identity={"of": "numbers"})
+
+
+def trained(run: TrainingRun, bad_step: int = 0):
+    """Weights at the end, and what was seen and told on the way."""
+    told = {"batches": [], "metrics": [], "sample": [], "progress": []}
+
+    def step(number: int) -> StepResult:
+        told["batches"].append(number)
+        run.optimiser.zero_grad()
+        loss = run.model(torch.full((1, 3), float("nan") if number == bad_step else number)).square().sum()
+        loss.backward()
+        return finish_step(run, {"loss": float(loss.detach())}, 1.0, lambda wrong: f"number {number}: {wrong}")
+
+    hooks = Hooks(
+        metrics=lambda step, values: told["metrics"].append((step, values["learning_rate"])),
+        sample=told["sample"].append,
+        progress=told["progress"].append,
+    )
+    loader = Numbers()
+    train(run, step, loader, CONFIG, hooks=hooks, done=resume(run, loader))
+    return run.model.weight.detach().clone(), told
+
+
+def test_any_step_is_taken_told_and_kept(tmp_path):
+    _, told = trained(run_of(tmp_path))
+    assert told["batches"] == told["progress"] == [1, 2, 3, 4, 5]
+    assert told["metrics"] == [(2, 1e-2), (4, 1e-2), (5, 1e-2)]
+    assert told["sample"] == [2, 4]
+    assert [path.name for path in checkpoints(tmp_path)] == ["step-000004", "step-000005"]
+
+
+def test_a_run_that_ends_in_an_error_goes_on_from_its_last_checkpoint_to_the_same_bits(tmp_path):
+    wanted, _ = trained(run_of(tmp_path / "a"))
+    with pytest.raises(NumericalError, match="number 4: loss"):
+        trained(run_of(tmp_path / "b"), bad_step=4)
+    found, told = trained(run_of(tmp_path / "b"))
+    assert told["batches"] == [3, 4, 5]
+    assert torch.equal(found, wanted)

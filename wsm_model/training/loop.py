@@ -1,0 +1,184 @@
+"""The loop that pretraining and post-training share: schedule, metrics, pictures, checkpoints, and exact resume."""
+
+import math
+import time
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol, TypeVar
+
+import torch
+from torch import nn
+from torch.nn.utils import clip_grad_norm_
+
+from wsm_data.errors import NumericalError
+from wsm_model.ranks import rank_and_world_size, whole
+from wsm_model.training.checkpoint import (
+    TrainingState,
+    checkpoints,
+    drop_old_checkpoints,
+    load_checkpoint,
+    save_checkpoint,
+)
+from wsm_model.training.config import LoopConfig
+from wsm_model.training.metrics import MetricsWriter
+from wsm_model.training.schedule import learning_rate, set_learning_rate
+
+BatchT = TypeVar("BatchT")
+BatchT_co = TypeVar("BatchT_co", covariant=True)
+
+
+class BatchSource(Protocol[BatchT_co]):
+    """A loader: iterating gives the rest of an epoch, and its state says where it stands."""
+
+    @property
+    def steps(self) -> int:
+        """Steps of an epoch."""
+
+    def __iter__(self) -> Iterator[BatchT_co]: ...
+
+    def state_dict(self) -> dict[str, Any]:
+        """Where it stands, as JSON."""
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Go to where a state says."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class StepResult:
+    """One optimiser step.
+
+    Attributes:
+        losses: total and parts, over all ranks.
+        gradient_norm: before clipping.
+    """
+
+    losses: Mapping[str, float]
+    gradient_norm: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Hooks:
+    """What is called on the way.
+
+    Attributes:
+        metrics: takes the numbers of a step; called on the first rank.
+        sample: draws pictures after a step; called on every rank.
+        progress: takes the number of steps done, on the first rank.
+    """
+
+    metrics: MetricsWriter
+    sample: Callable[[int], None]
+    progress: Callable[[int], None]
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainingRun:
+    """What a run trains, and where it keeps it.
+
+    Attributes:
+        model: on its device, sharded if there are several ranks; all its parameters are kept.
+        optimiser: of its parameters.
+        folder: of the checkpoints.
+        identity: what the run is made from; checkpoints of another are refused by it.
+    """
+
+    model: nn.Module
+    optimiser: torch.optim.Optimizer
+    folder: Path
+    identity: Mapping[str, object]
+
+
+def total_steps(config: LoopConfig, loader: BatchSource[object]) -> int:
+    """Optimiser steps of a run."""
+    return config.max_steps or config.epochs * loader.steps
+
+
+def resume(run: TrainingRun, loader: BatchSource[object]) -> int:
+    """Go to the latest checkpoint, if there is one; returns the steps done.
+
+    Raises:
+        ConfigError: it belongs to another run.
+        IntegrityError: it is damaged.
+    """
+    found = checkpoints(run.folder)
+    if not found:
+        return 0
+    state = load_checkpoint(found[-1], run.model, run.optimiser, run.identity)
+    loader.load_state_dict(dict(state.loader))
+    return state.step
+
+
+def train(
+    run: TrainingRun,
+    step: Callable[[BatchT], StepResult],
+    loader: BatchSource[BatchT],
+    config: LoopConfig,
+    *,
+    hooks: Hooks,
+    done: int,
+) -> None:
+    """Take steps until the schedule ends.
+
+    Args:
+        run: what is trained.
+        step: takes one step of the optimiser on this rank's share of a global batch.
+        loader: of this rank.
+        config: how long, and how often.
+        hooks: metrics, pictures and progress.
+        done: steps done before.
+
+    Raises:
+        NumericalError: of `step`; no checkpoint is written then.
+    """
+    steps = total_steps(config, loader)
+    rank, _ = rank_and_world_size()
+    while done < steps:
+        for batch in loader:
+            started_s = time.perf_counter()
+            rate = learning_rate(done, steps, config.optimiser)
+            set_learning_rate(run.optimiser, rate)
+            result = step(batch)
+            done += 1
+            is_last = done == steps
+            if rank == 0:
+                hooks.progress(done)
+                if done % config.log_every == 0 or is_last:
+                    seconds = time.perf_counter() - started_s
+                    extra = {"gradient_norm": result.gradient_norm, "learning_rate": rate, "seconds": seconds}
+                    hooks.metrics(done, {**result.losses, **extra})
+            if config.sample_every and done % config.sample_every == 0:
+                hooks.sample(done)
+            if done % config.checkpoint_every == 0 or is_last:
+                save_checkpoint(
+                    run.folder,
+                    run.model,
+                    run.optimiser,
+                    TrainingState(step=done, loader=loader.state_dict(), identity=run.identity),
+                )
+                if rank == 0:
+                    drop_old_checkpoints(run.folder, config.keep_checkpoints)
+            if is_last:
+                break
+
+
+def finish_step(
+    run: TrainingRun, losses: Mapping[str, float], clip_norm: float, blame: Callable[[str], str]
+) -> StepResult:
+    """Clip the gradients that were gathered and step the optimiser, if all is finite.
+
+    Args:
+        run: what is trained.
+        losses: over all ranks.
+        clip_norm: largest norm of the gradient.
+        blame: says of which data the step was, given what is not finite.
+
+    Raises:
+        NumericalError: a loss or the gradient is not finite.
+    """
+    norm = float(whole(clip_grad_norm_(run.model.parameters(), clip_norm)))
+    wrong = [name for name, value in losses.items() if not math.isfinite(value)]
+    if wrong or not math.isfinite(norm):
+        raise NumericalError(blame(", ".join(wrong) or f"gradient norm {norm}"))
+    run.optimiser.step()
+    return StepResult(losses=losses, gradient_norm=norm)

@@ -1,0 +1,86 @@
+"""A step of pretraining on the objective (paper, section 3.3 and appendix B.1)."""
+
+import math
+from contextlib import AbstractContextManager
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from wsm_data.schema.batch import ClipBatch
+from wsm_model.batches import TrainingInputs, training_inputs
+from wsm_model.losses.total import LossCounts, loss_counts, pretraining_loss
+from wsm_model.model import WorldSlamModel
+from wsm_model.ranks import rank_and_world_size, sum_over_ranks
+from wsm_model.training.config import Precision, TrainingConfig
+from wsm_model.training.loop import StepResult, TrainingRun, finish_step
+
+
+def pretraining_step(
+    model: WorldSlamModel, run: TrainingRun, config: TrainingConfig, batch: ClipBatch[Tensor]
+) -> StepResult:
+    """One step of the optimiser on this rank's share of a global batch.
+
+    Losses are means over the whole global batch, so neither the number of ranks nor `micro_rows` changes them.
+
+    Raises:
+        NumericalError: a loss or a gradient is not finite; names step, clips and parts.
+    """
+    device = batch.rgb.device
+    counts = _global_counts(batch, device)
+    sums: dict[str, float] = {}
+    bad: list[str] = []
+    parts = training_inputs(
+        batch,
+        seed=config.seed,
+        flow_shift=config.loss.flow_shift,
+        depth_noise=config.depth_noise,
+        micro_rows=config.micro_rows,
+    )
+    run.optimiser.zero_grad(set_to_none=True)
+    for part in parts:
+        losses = _backward(model, part, config, counts)
+        for name, value in losses.items():
+            sums[name] = sums.get(name, 0.0) + value
+        if not all(math.isfinite(value) for value in losses.values()):
+            bad += part.keys
+    names = sorted(sums)
+    totals = dict(zip(names, sum_over_ranks([sums[name] for name in names], device), strict=True))
+    return finish_step(run, totals, config.optimiser.clip_norm, lambda wrong: _not_finite(batch, wrong, bad))
+
+
+def _backward(
+    model: WorldSlamModel, part: TrainingInputs, config: TrainingConfig, counts: LossCounts
+) -> dict[str, float]:
+    _, world_size = rank_and_world_size()
+    with _precision(config.precision, part.noise.device):
+        outputs = model(part.inputs)
+    report = pretraining_loss(part.inputs, outputs, part.noise, config.loss, counts)
+    (report.total * world_size).backward()  # gradients are averaged over the ranks
+    names = ["loss", *report.parts]
+    values = torch.stack([report.total.detach(), *(value.detach() for value in report.parts.values())]).tolist()
+    return dict(zip(names, values, strict=True))
+
+
+def _global_counts(batch: ClipBatch[Tensor], device: torch.device) -> LossCounts:
+    own = loss_counts(batch.spans)
+    dreamed, latents, sequences = sum_over_ranks([own.dreamed, own.latents, own.sequences], device)
+    return LossCounts(dreamed=dreamed, latents=latents, sequences=sequences)
+
+
+def _precision(precision: Precision, device: torch.device) -> AbstractContextManager[Any]:
+    return torch.autocast(device.type, torch.bfloat16, enabled=precision is Precision.BFLOAT16)
+
+
+def _not_finite(batch: ClipBatch[Tensor], wrong: str, bad: list[str]) -> str:
+    inputs = [name for name in ("rgb", "depth", "poses", "goal_camera0_m") if not _finite(getattr(batch, name))]
+    cause = f"the batch itself holds NaN or infinity in {', '.join(inputs)}" if inputs else "the batch is finite"
+    return (
+        f"epoch {batch.epoch}, step {batch.step}: losses and gradients must be finite, found {wrong} not "
+        f"finite for the clips {', '.join(bad or batch.keys)}; {cause}. Nothing was written over the last checkpoint. "
+        "Check the clips with `wsm verify`, lower the learning rate or train in float32, and run the same command again"
+    )
+
+
+def _finite(values: Tensor) -> bool:
+    return bool(torch.isfinite(values).all())
