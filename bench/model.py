@@ -105,20 +105,22 @@ def planning_steps(history: int) -> dict[str, float]:
     import torch
 
     from wsm_model.inference.sampler import flow_schedule
-    from wsm_model.inference.session import Session, SessionConfig
+    from wsm_model.inference.session import Episode, Session, SessionConfig
 
     model, seen = _model("blocks").eval(), _latents(1, history + 1)
-    schedule, noise, goal = flow_schedule(DREAM_STEPS, 5.0), _latents(1, CHUNK), torch.zeros(1, 3)
+    schedule, noise, goal = flow_schedule(DREAM_STEPS, 5.0), _latents(1, 1, CHUNK), torch.zeros(1, 3)
 
-    def observed(latents: int) -> Session:
-        session = Session(model, SessionConfig(chunk_size=CHUNK, cache_latents=history + CHUNK + 1))
+    session = Session(model, SessionConfig(chunk_size=CHUNK, cache_latents=history + CHUNK + 1))
+
+    def observed(latents: int) -> Episode:
+        episode = session.start()
         for number in range(latents):
-            session.observe(seen[:, number])
-        return session
+            session.observe([episode], seen[:, number])
+        return episode
 
-    def plan(session: Session) -> None:
-        session.observe(seen[:, history])
-        session.dream(goal, noise, schedule)
+    def plan(episode: Episode) -> None:
+        session.observe([episode], seen[:, history])
+        session.dream([episode], goal, noise, schedule)
 
     def recompute() -> None:
         plan(observed(history))

@@ -19,9 +19,8 @@ from wsm_data.view.clip.pictures import spread_frames
 from wsm_data.view.training.curves import draw_training_curves
 from wsm_data.view.training.dream_sheet import DreamSheet, draw_dream_sheet
 from wsm_model.config import Variant
-from wsm_model.inference.passes import StateEstimate
 from wsm_model.inference.sampler import flow_schedule
-from wsm_model.inference.session import Session
+from wsm_model.inference.session import Session, StateEstimate
 from wsm_model.losses.pose import raw_frame_poses
 from wsm_model.model import WorldSlamModel
 
@@ -98,21 +97,22 @@ def draw_dream(
     seen = max(1, min(length - chunk, int(length * _SEEN_SHARE)))
     end = min(length, seen + chunk)
     session = Session(model, config.session)
+    episode = session.start()
     depth, poses = torch.zeros_like(rgb[:end]), torch.zeros_like(batch.poses[0, :end].float())
     for number, latent in enumerate(rgb[:seen]):
-        states = session.observe(latent[None], _issued_poses(model, batch, number))
-        place = slice(states.first, states.first + states.poses.shape[1])
-        poses[place] = states.poses[0]
+        (states,) = session.observe([episode], latent[None], [_issued_poses(model, batch, number)])
+        place = slice(states.first, states.first + len(states.poses))
+        poses[place] = states.poses
         if states.depth is not None:
-            depth[place] = states.depth[0]
-    noise = torch.randn(1, end - seen, *rgb.shape[1:], generator=torch.Generator().manual_seed(0)).to(rgb.device)
-    dream = session.dream(batch.goal_camera0_m[:1].float(), noise, flow_schedule(config.flow_steps, shift))
+            depth[place] = states.depth
+    noise = torch.randn(1, 1, end - seen, *rgb.shape[1:], generator=torch.Generator().manual_seed(0)).to(rgb.device)
+    (dream,) = session.dream(
+        [episode], batch.goal_camera0_m[:1].float(), noise, flow_schedule(config.flow_steps, shift)
+    )
     if path is None:
         return
-    poses[seen:] = dream.states.poses[0]
-    estimated = None
-    if dream.states.depth is not None:
-        estimated = torch.cat([depth[:seen], dream.states.depth[0]])
+    poses[seen:] = dream.poses[0]
+    estimated = None if dream.depth is None else torch.cat([depth[:seen], dream.depth[0]])
     _draw(path, batch, decoding, title, seen=seen, end=end, dreamed=dream.rgb[0], depth=estimated, poses=poses)
 
 
@@ -120,7 +120,7 @@ def _issued_poses(model: WorldSlamModel, batch: Batch, latent: int) -> StateEsti
     """The true poses of a latent, where the model must be told them."""
     if model.config.variant is Variant.SLAM:
         return None
-    return StateEstimate(first=latent, depth=None, poses=batch.poses[:1, latent : latent + 1].float())
+    return StateEstimate(first=latent, depth=None, poses=batch.poses[0, latent : latent + 1].float())
 
 
 def _draw(

@@ -61,14 +61,15 @@ class FlowErrors:
 def estimate_states(model: WorldSlamModel, rgb_FChw: Tensor, config: SessionConfig) -> tuple[Tensor, Tensor]:
     """Depth latents [F, C, h, w] and pose slots [F, M, 7] of one clip, each as it was last estimated."""
     session = Session(model, config)
+    episode = session.start()
     depth = torch.zeros_like(rgb_FChw)
     poses = torch.zeros(len(rgb_FChw), model.config.pose_slots, 7, device=rgb_FChw.device)
     for latent in rgb_FChw:
-        states = session.observe(latent[None])
-        window = slice(states.first, states.first + states.poses.shape[1])
-        poses[window] = states.poses[0]
+        (states,) = session.observe([episode], latent[None])
+        window = slice(states.first, states.first + len(states.poses))
+        poses[window] = states.poses
         if states.depth is not None:
-            depth[window] = states.depth[0]
+            depth[window] = states.depth
     return depth, poses
 
 

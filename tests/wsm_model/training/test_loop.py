@@ -49,7 +49,7 @@ def trained(run: TrainingRun, bad_step: int = 0):
     def step(number: int) -> StepResult:
         told["batches"].append(number)
         run.optimiser.zero_grad()
-        loss = run.model(torch.full((1, 3), float("nan") if number == bad_step else number)).square().sum()
+        loss = run.model(torch.full((1, 3), float("nan") if number == bad_step else float(number))).square().sum()
         loss.backward()
         return finish_step(run, {"loss": float(loss.detach())}, 1.0, lambda wrong: f"number {number}: {wrong}")
 
