@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 import torch
-from wsm_data.loaders.order.epoch_plan import chunk_sizes
 
 from wsm_data.loaders.batches.batch import PackedBatch
 from wsm_data.loaders.batches.filling import arrange, batch_layout, describe, slots_of
 from wsm_data.loaders.config import Arrangement, OrderConfig, SourceConfig
+from wsm_data.loaders.order.epoch_order import chunk_sizes
 from wsm_data.loaders.reading.clip_places import clip_places
 from wsm_data.loaders.sources.clips import open_sources
 
@@ -90,7 +90,7 @@ def test_describing_says_all_that_is_not_read_whatever_the_memory_held_before(or
         expected = expected_batch(batch, released.clips, row_latents=7)
         for name in ("still", "sequence_id", "latent_index", "goal_camera0_m"):
             np.testing.assert_array_equal(getattr(batch, name), expected[name], err_msg=name)
-        assert [span.chunk_size for span in spans] == chunk_sizes(refs, plan.order, plan.epoch).tolist()
+        assert [span.chunk_size for span in spans] == chunk_sizes(refs, epoch_order.config, epoch_order.epoch).tolist()
         padding = batch.sequence_id < 0
         padded += int(padding.sum())
         for values in (batch.rgb, batch.depth, batch.depth_valid, batch.poses):
