@@ -3,6 +3,8 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from wsm_data.access.shard_reader import ShardReader, Span
 from wsm_data.errors import IntegrityError
 from wsm_data.files.digest import xxh3_64
@@ -35,7 +37,7 @@ def read_members(
     span = span_of_members(row, names)
     first = span.offset - row.clip_offset
     members = tuple(_moved(member, first) for member in row.members if member.name in names)
-    data = memoryview(bytearray(span.size))
+    data = memoryview(np.empty(span.size, np.uint8))  # not filled with zeros first, as a bytearray is
     read_until_whole(
         reader,
         row.shard,
