@@ -1,6 +1,6 @@
 """What a video codec is to the rest of the project."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -11,6 +11,17 @@ from wsm_data.schema.sequence import TEMPORAL_RATIO
 
 SIDE_MULTIPLE_PX = 32
 """Sides of a video are multiples of this: 16 pixels a latent cell, and 2 x 2 cells a patch of the transformer."""
+
+
+class EncoderState(Protocol):
+    """Where the encoding of one video stands that comes latent by latent. To encode on from it leaves it as it was."""
+
+    @property
+    def latents(self) -> int:
+        """Latents encoded so far."""
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """All of it as arrays, to be stored; `VideoCodec.restored` is the way back."""
 
 
 class VideoCodec(Protocol):
@@ -30,6 +41,23 @@ class VideoCodec(Protocol):
     def encode_many(self, videos: Sequence[Float32Array]) -> list[Float32Array]:
         """Latents of several videos; a codec that batches them agrees with `encode` to the rounding of its dtype."""
 
+    def encode_next(self, frames: Float32Array, state: EncoderState | None = None) -> tuple[Float32Array, EncoderState]:
+        """The next latent of a video that is still going on, as it stands in `encode` of the whole.
+
+        Args:
+            frames: the first frame alone, float32 [1, H, W, 3]; after it the next four.
+            state: what the call before gave for this video; None for the first frame.
+
+        Returns:
+            The latent, float32 [C, h, w], and the state behind it.
+
+        Raises:
+            ValueError: another number of frames, a side that is not a multiple of 32, a state that does not fit.
+        """
+
+    def restored(self, arrays: Mapping[str, np.ndarray]) -> EncoderState:
+        """The state that gave these arrays."""
+
     def decode(self, latents: Float32Array) -> Float32Array:
         """Video of latents [F, C, h, w], float32 [1 + 4 (F - 1), H, W, 3], clamped to [-1, 1]."""
 
@@ -46,9 +74,26 @@ def require_video(video: Float32Array) -> None:
         ValueError: names what must hold and what was found.
     """
     require_array("video", video, np.float32, (None, None, None, 3))
-    frames, height, width, _ = video.shape
-    if frames % TEMPORAL_RATIO != 1:
-        raise ValueError(f"a video must have 1 + 4k frames, found {frames}; pad it with repeats of its last frame")
+    if len(video) % TEMPORAL_RATIO != 1:
+        raise ValueError(f"a video must have 1 + 4k frames, found {len(video)}; pad it with repeats of its last frame")
+    _require_sides(video)
+
+
+def require_next_frames(frames: Float32Array, latents: int) -> None:
+    """Check that `frames` are those of the next latent after `latents` others: one for the first, four for each later.
+
+    Raises:
+        ValueError: names what must hold and what was found.
+    """
+    require_array("frames", frames, np.float32, (None, None, None, 3))
+    wanted = TEMPORAL_RATIO if latents else 1
+    if len(frames) != wanted:
+        raise ValueError(f"latent {latents} of a video is made of {wanted} frames, found {len(frames)}")
+    _require_sides(frames)
+
+
+def _require_sides(video: Float32Array) -> None:
+    height, width = video.shape[1:3]
     if not height or not width or height % SIDE_MULTIPLE_PX or width % SIDE_MULTIPLE_PX:
         raise ValueError(f"sides of a video must be multiples of {SIDE_MULTIPLE_PX} px, found {width}x{height}")
 

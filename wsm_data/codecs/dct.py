@@ -9,12 +9,12 @@ The two weights were tuned once, for PSNR, on three real and six generated noisy
 of each video for itself, this one set loses 0.4 to 1.0 dB, and 2.3 dB in one real video.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from wsm_data.codecs.base import require_latents, require_video
+from wsm_data.codecs.base import EncoderState, require_latents, require_next_frames, require_video
 from wsm_data.codecs.dct_kernels import FRAMES, SIDE, cosine_basis, forward, inverse
 from wsm_data.files.digest import digest_json
 from wsm_data.schema.arrays import Float32Array, Int16Array
@@ -61,6 +61,17 @@ def _channels_of_planes() -> tuple[tuple[np.ndarray, Int16Array], ...]:
 _PLANES = _channels_of_planes()
 
 
+@dataclass(frozen=True, kw_only=True)
+class DctEncoderState:
+    """Implements `EncoderState`: a latent depends on its own frames alone, so only their number is kept."""
+
+    latents: int
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """See `EncoderState.arrays`."""
+        return {"latents": np.array(self.latents)}
+
+
 @dataclass(frozen=True)
 class DctCodec:
     """Implements `VideoCodec` on the CPU, in float32.
@@ -75,21 +86,27 @@ class DctCodec:
         require_video(video)
         frames, height, width, _ = video.shape
         latents = np.zeros((1 + (frames - 1) // FRAMES, CHANNELS, height // SIDE, width // SIDE), np.float32)
-        planes = np.empty((3, FRAMES, height, width), np.float32)
-        used = 1 if video.strides[-1] == 0 else 3  # equal channels have no chroma: those latents are zero either way
+        planes = _planes_for(video)
         for j, latent in enumerate(latents):
-            _fill_planes(video[:1] if j == 0 else video[FRAMES * j - 3 : FRAMES * j + 1], planes[:used])
-            for plane, (channels, frequencies) in zip(planes[:used], _PLANES, strict=False):
-                coefficients = np.empty((len(channels), *latent.shape[1:]), np.float32)
-                forward(plane, frequencies, _IN_TIME, _IN_SPACE, coefficients)
-                latent[channels] = coefficients
-        latents[0, coefficient_table()[:, 1] > 0] = 0  # the rounding of a sum that is zero in exact arithmetic
-        latents *= np.float32(_SCALE)
+            _fill_latent(video[:1] if j == 0 else video[FRAMES * j - 3 : FRAMES * j + 1], planes, latent)
         return latents
 
     def encode_many(self, videos: Sequence[Float32Array]) -> list[Float32Array]:
         """See `VideoCodec.encode_many`."""
         return [self.encode(video) for video in videos]
+
+    def encode_next(self, frames: Float32Array, state: EncoderState | None = None) -> tuple[Float32Array, EncoderState]:
+        """See `VideoCodec.encode_next`; the same bits as in `encode`."""
+        done = state.latents if state else 0
+        require_next_frames(frames, done)
+        height, width = frames.shape[1:3]
+        latent = np.zeros((CHANNELS, height // SIDE, width // SIDE), np.float32)
+        _fill_latent(frames, _planes_for(frames), latent)
+        return latent, DctEncoderState(latents=done + 1)
+
+    def restored(self, arrays: Mapping[str, np.ndarray]) -> EncoderState:
+        """See `VideoCodec.restored`."""
+        return DctEncoderState(latents=int(arrays["latents"]))
 
     def decode(self, latents: Float32Array) -> Float32Array:
         """See `VideoCodec.decode`. Of latent 0 only what a held frame can have is used: its temporal means."""
@@ -124,6 +141,24 @@ class DctCodec:
             spatial_ratio=SIDE,
             settings=settings,
         )
+
+
+def _planes_for(video: Float32Array) -> Float32Array:
+    """Memory for the planes of a latent; equal channels have no chroma: those latents are zero either way."""
+    used = 1 if video.strides[-1] == 0 else 3
+    return np.empty((used, FRAMES, *video.shape[1:3]), np.float32)
+
+
+def _fill_latent(frames: Float32Array, planes: Float32Array, latent: Float32Array) -> None:
+    """Encode the one or four frames of a latent into its zeros."""
+    _fill_planes(frames, planes)
+    for plane, (channels, frequencies) in zip(planes, _PLANES, strict=False):
+        coefficients = np.empty((len(channels), *latent.shape[1:]), np.float32)
+        forward(plane, frequencies, _IN_TIME, _IN_SPACE, coefficients)
+        latent[channels] = coefficients
+    if len(frames) == 1:
+        latent[coefficient_table()[:, 1] > 0] = 0  # the rounding of a sum that is zero in exact arithmetic
+    latent *= np.float32(_SCALE)
 
 
 def _fill_planes(video: Float32Array, planes: Float32Array) -> None:

@@ -15,10 +15,11 @@ from typing import Any
 import numpy as np
 import torch
 from diffusers import AutoencoderKLWan
+from diffusers.models.autoencoders.autoencoder_kl_wan import WanCausalConv3d, patchify
 from safetensors import SafetensorError
 from safetensors.torch import load_file
 
-from wsm_data.codecs.base import require_latents, require_video
+from wsm_data.codecs.base import EncoderState, require_latents, require_next_frames, require_video
 from wsm_data.codecs.clip_video import pad_frames
 from wsm_data.errors import ConfigError
 from wsm_data.files.digest import digest_json, sha256_file
@@ -46,6 +47,28 @@ _DTYPES = MappingProxyType({"float32": torch.float32, "bfloat16": torch.bfloat16
 _CONFIG_FILE = "config.json"
 _WEIGHTS_FILE = "diffusion_pytorch_model.safetensors"
 _INDEX_FILE = "diffusion_pytorch_model.safetensors.index.json"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class WanEncoderState:
+    """Implements `EncoderState`: what each causal convolution must see of the frames before, on the network's device.
+
+    Attributes:
+        latents: latents encoded so far.
+        features: last frames that went into each convolution, in the order of the network; None where none are kept.
+    """
+
+    latents: int
+    features: tuple[torch.Tensor | None, ...]
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """See `EncoderState.arrays`; float32, which holds bfloat16 exactly."""
+        kept = {
+            f"feature_{number:03d}": feature.float().cpu().numpy()
+            for number, feature in enumerate(self.features)
+            if feature is not None
+        }
+        return {"latents": np.array(self.latents), "features": np.array(len(self.features)), **kept}
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +121,34 @@ class WanCodec:
             x = torch.from_numpy(padded).to(self.vae.device, self.vae.dtype).permute(0, 4, 1, 2, 3).contiguous()
             mode = self.vae.encode(x).latent_dist.mode()
         return np.ascontiguousarray(mode.permute(0, 2, 1, 3, 4).float().cpu().numpy())
+
+    def encode_next(self, frames: Float32Array, state: EncoderState | None = None) -> tuple[Float32Array, EncoderState]:
+        """See `VideoCodec.encode_next`; agrees with `encode` to the rounding of the dtype.
+
+        These are the steps that `AutoencoderKLWan.encode` takes inside, with the features between them in the state.
+        """
+        if state is not None and not isinstance(state, WanEncoderState):
+            raise ValueError(f"a state of the codec wan must be given, found {type(state).__name__}")
+        done = state.latents if state else 0
+        require_next_frames(frames, done)
+        features = list(state.features) if state else [None] * _convolutions(self.vae)
+        with torch.inference_mode():
+            x = torch.from_numpy(frames).to(self.vae.device, self.vae.dtype).permute(3, 0, 1, 2)[None].contiguous()
+            x = patchify(x, patch_size=self.vae.config.patch_size)
+            if features[0] is not None and features[0].shape[-2:] != x.shape[-2:]:
+                raise ValueError(f"frames of a video must have one size, found {frames.shape[1:3]} after another")
+            moments = self.vae.quant_conv(self.vae.encoder(x, feat_cache=features, feat_idx=[0]))
+            mode = moments.chunk(2, dim=1)[0][0, :, 0]
+        latent = np.ascontiguousarray(mode.float().cpu().numpy())
+        return latent, WanEncoderState(latents=done + 1, features=tuple(features))
+
+    def restored(self, arrays: Mapping[str, np.ndarray]) -> EncoderState:
+        """See `VideoCodec.restored`."""
+        stored = [arrays.get(f"feature_{number:03d}") for number in range(int(arrays["features"]))]
+        features = [
+            None if one is None else torch.from_numpy(one).to(self.vae.device, self.vae.dtype) for one in stored
+        ]
+        return WanEncoderState(latents=int(arrays["latents"]), features=tuple(features))
 
     def decode(self, latents: Float32Array) -> Float32Array:
         """See `VideoCodec.decode`."""
@@ -190,6 +241,11 @@ def _weight_files(folder: Path) -> tuple[Path, ...]:
     if missing:
         raise ConfigError(f"{folder} must hold the weights as safetensors, missing: {', '.join(missing)}")
     return files
+
+
+def _convolutions(vae: AutoencoderKLWan) -> int:
+    """Places for features that the encoder asks for: one for each causal convolution."""
+    return sum(isinstance(module, WanCausalConv3d) for module in vae.encoder.modules())
 
 
 def _load_tensors(vae: AutoencoderKLWan, files: Sequence[Path], folder: Path) -> None:

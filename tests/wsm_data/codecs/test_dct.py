@@ -202,3 +202,26 @@ def test_the_digest_stands_for_these_bits(noise_video):
     latents = CODEC.encode(np.round(noise_video * 64) / 64)
     assert CODEC.describe().digest[:16] == "829106d82e93619a"
     assert hashlib.sha256(latents.tobytes()).hexdigest()[:16] == "46e790a2b187bd8a"
+
+
+@pytest.mark.parametrize("is_grey", [False, True])
+def test_a_video_that_comes_frame_by_frame_has_the_latents_of_the_whole_bit_for_bit(smooth_video, is_grey):
+    codec, state, found = DctCodec(), None, []
+    video = np.broadcast_to(smooth_video[..., :1], smooth_video.shape) if is_grey else smooth_video
+    for frames in (video[:1], video[1:5], video[5:9], video[9:13]):
+        latent, state = codec.encode_next(frames, state)
+        state = codec.restored(state.arrays())
+        found.append(latent)
+    assert state.latents == 4
+    assert np.array_equal(np.stack(found), codec.encode(video))
+
+
+def test_frames_that_are_not_those_of_the_next_latent_are_refused(smooth_video):
+    codec = DctCodec()
+    with pytest.raises(ValueError, match="latent 0 of a video is made of 1 frames, found 4"):
+        codec.encode_next(smooth_video[:4])
+    _, state = codec.encode_next(smooth_video[:1])
+    with pytest.raises(ValueError, match="latent 1 of a video is made of 4 frames, found 1"):
+        codec.encode_next(smooth_video[1:2], state)
+    with pytest.raises(ValueError, match="multiples of 32 px, found 90x64"):
+        codec.encode_next(np.ascontiguousarray(smooth_video[1:5, :, :90]), state)

@@ -265,3 +265,48 @@ def test_a_gpu_gives_the_latents_of_the_cpu(weights, noise_video, dtype):
     on_gpu = make_codec(CodecConfig(name="wan", weights=str(weights), device="cuda", dtype=dtype))
     difference = on_gpu.encode(noise_video) - load(weights, dtype=dtype).encode(noise_video)
     assert np.abs(difference).max() < {"float32": 2e-3, "bfloat16": 0.12}[dtype]  # TF32 convolutions: 2^-11
+
+
+def encoded_by_latents(codec, videos, *, is_stored=False):
+    """Latents of videos that come frame by frame, in turn, each with a state of its own."""
+    states, found = [None] * len(videos), [[] for _ in videos]
+    for first, end in ((0, 1), (1, 5), (5, 9)):
+        for number, video in enumerate(videos):
+            latent, state = codec.encode_next(video[first:end], states[number])
+            found[number].append(latent)
+            states[number] = codec.restored(state.arrays()) if is_stored else state
+    return [np.stack(latents) for latents in found]
+
+
+@pytest.mark.parametrize("dtype", ["float32", "bfloat16"])
+def test_videos_that_come_frame_by_frame_have_the_latents_of_the_wholes(weights, noise_video, dtype):
+    codec, videos = load(weights, dtype=dtype), [noise_video, noise_video[:, ::-1].copy()]
+    for video, found in zip(videos, encoded_by_latents(codec, videos), strict=True):
+        np.testing.assert_allclose(found, codec.encode(video), atol=TOLERANCE[dtype])
+    assert np.abs(codec.encode(videos[0]) - codec.encode(videos[1])).max() > 5 * TOLERANCE[dtype]
+
+
+@pytest.mark.parametrize("dtype", ["float32", "bfloat16"])
+def test_a_state_that_was_stored_goes_on_in_the_same_bits(weights, noise_video, dtype):
+    codec = load(weights, dtype=dtype)
+    for kept, stored in zip(
+        encoded_by_latents(codec, [noise_video]), encoded_by_latents(codec, [noise_video], is_stored=True), strict=True
+    ):
+        assert np.array_equal(kept, stored)
+
+
+def test_encoding_on_from_a_state_leaves_it_as_it_was(codec, noise_video):
+    _, state = codec.encode_next(noise_video[:1])
+    once, _ = codec.encode_next(noise_video[1:5], state)
+    again, after = codec.encode_next(noise_video[1:5], state)
+    assert np.array_equal(once, again)
+    assert (state.latents, after.latents) == (1, 2)
+
+
+def test_a_state_of_another_codec_or_another_size_is_refused(codec, noise_video):
+    _, state = codec.encode_next(noise_video[:1])
+    with pytest.raises(ValueError, match="must have one size"):
+        codec.encode_next(noise_video[1:5, :, :32], state)
+    _, other = make_codec(CodecConfig()).encode_next(noise_video[:1])
+    with pytest.raises(ValueError, match="a state of the codec wan"):
+        codec.encode_next(noise_video[1:5], other)
