@@ -1,7 +1,6 @@
 """The loader: batches of one rank in the order of the epoch, from where the state says, and a state to go on from."""
 
 import os
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from types import TracebackType
@@ -11,14 +10,14 @@ import torch.utils.data
 
 from wsm_data.access.shard_reader import ShardReader
 from wsm_data.errors import ConfigError
-from wsm_data.loaders.batches.batch import Batch, PackedBatch
+from wsm_data.loaders.batches.batch import Batch, BatchBlock
 from wsm_data.loaders.batches.transfer import hand_over, open_transfer
 from wsm_data.loaders.config import LoaderConfig
 from wsm_data.loaders.ledger.writer import LedgerWriter
 from wsm_data.loaders.order.epoch_order import EpochOrder, EpochSummary, rows_per_rank
 from wsm_data.loaders.ranks import place_among_ranks
-from wsm_data.loaders.reading.step_reader import StepReader
-from wsm_data.loaders.reading.stream import BatchStream, Delivered, open_stream
+from wsm_data.loaders.reading.delivery import Delivery, deliver
+from wsm_data.loaders.reading.step_reader import Delivered, StepReader
 from wsm_data.loaders.sources.clips import Sources, open_sources
 from wsm_data.loaders.sources.state import loader_state, restore, state_to_json
 from wsm_data.loaders.timing import Part, Timing
@@ -66,6 +65,7 @@ class ClipLoader(torch.utils.data.IterableDataset[Batch]):
         self._sources = open_sources(config.sources) if sources is None else sources
         manifest = self._sources.tables[0].release.manifest
         self._transfer = open_transfer(config.read, manifest)
+        self.timing = Timing()
         self._reader = self._open_reader()
         self._process = os.getpid()
         self._template = loader_state(self._sources, config.order, epoch=0, step=0)
@@ -73,8 +73,7 @@ class ClipLoader(torch.utils.data.IterableDataset[Batch]):
         self._epoch_order: EpochOrder | None = None
         self._epoch, self._step = 0, 0
         self._turn = 0
-        self._running: BatchStream[Any] | None = None
-        self.timing = Timing()
+        self._running: Delivery[Any] | None = None
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Cross to another process as settings and a place; what is open stays here."""
@@ -148,16 +147,16 @@ class ClipLoader(torch.utils.data.IterableDataset[Batch]):
             batch_of: the batch that something was made of.
         """
         self._turn += 1
-        turn, stream = self._turn, self._start(complete)
+        turn, delivery = self._turn, self._start(complete)
         try:
-            while (delivered := self._deliver(turn, stream, batch_of)) is not None:
+            while (delivered := self._deliver(turn, delivery, batch_of)) is not None:
                 yield delivered
                 del delivered  # its memory is free as soon as the caller lets go of it
         except BaseException:  # an error of a step, an interrupt, or the caller breaks off
             if turn == self._turn:
                 self._stop()
             raise
-        stream.close()
+        delivery.close()
         self._running = None
         self._epoch, self._step = self._epoch + 1, 0
 
@@ -180,15 +179,15 @@ class ClipLoader(torch.utils.data.IterableDataset[Batch]):
     ) -> None:
         self.close()
 
-    def _start(self, complete: Callable[[Batch, Sequence[ShardReader]], Delivered]) -> BatchStream[Delivered]:
+    def _start(self, complete: Callable[[Batch, Sequence[ShardReader]], Delivered]) -> Delivery[Delivered]:
         """Begin to deliver from the current place; an older iterator stops reading."""
         self._stop()
         if self._process != os.getpid():  # closed, or of another process: a fork takes neither threads nor connections
             self._reader, self._process = self._open_reader(), os.getpid()
         transfer, readers = self._transfer, self._reader.readers
 
-        def finish(packed: PackedBatch) -> Delivered:
-            return complete(transfer(packed), readers)
+        def finish(block: BatchBlock) -> Delivered:
+            return complete(transfer(block), readers)
 
         worker = torch.utils.data.get_worker_info()
         first, stride = (0, 1) if worker is None else (worker.id, worker.num_workers)
@@ -197,14 +196,12 @@ class ClipLoader(torch.utils.data.IterableDataset[Batch]):
         steps = range(self._step + (first - self._step) % stride, self.steps, stride)
         if self._ledger is not None:
             self._ledger.begin(self._epoch, self._step, self.steps)
-        stream = open_stream(
-            self._reader, finish, self.epoch_order, steps, self._config.read, self.timing, inline=worker is not None
-        )
-        self._running = stream
-        return stream
+        delivery = deliver(self._reader, finish, self.epoch_order, steps, self._config.read, inline=worker is not None)
+        self._running = delivery
+        return delivery
 
     def _deliver(
-        self, turn: int, stream: BatchStream[Delivered], batch_of: Callable[[Delivered], Batch]
+        self, turn: int, delivery: Delivery[Delivered], batch_of: Callable[[Delivered], Batch]
     ) -> Delivered | None:
         """What comes next, counted and recorded; None where the epoch is over."""
         if turn != self._turn:
@@ -212,9 +209,8 @@ class ClipLoader(torch.utils.data.IterableDataset[Batch]):
                 "this iterator was overtaken: another one was started since, or the loader was moved or closed; a "
                 "loader has one place, so advance the newest iterator only"
             )
-        start = time.perf_counter()
-        delivered = next(stream, None)
-        self.timing.add({Part.WAIT: time.perf_counter() - start})
+        with self.timing.measure(Part.WAIT):
+            delivered = next(delivery, None)
         if delivered is None:
             return None
         batch = batch_of(delivered)
@@ -243,7 +239,7 @@ class ClipLoader(torch.utils.data.IterableDataset[Batch]):
         self._process = _CLOSED
 
     def _open_reader(self) -> StepReader:
-        return StepReader(self._sources, self._config.read, rank=self._rank, world_size=self._world_size)
+        return StepReader(self._sources, self._config.read, self.timing, rank=self._rank, world_size=self._world_size)
 
     def _open_ledger(self) -> LedgerWriter | None:
         identity = {"sources": self._template.sources, "order": self._template.order}

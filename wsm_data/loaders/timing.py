@@ -1,8 +1,7 @@
-"""Where the time of a loader goes: seconds by part, added up by all of its threads."""
+"""Where the time of a loader goes: seconds by part, added up over all of its threads."""
 
 import threading
 import time
-from collections.abc import Iterable, Mapping
 from enum import StrEnum
 
 
@@ -23,11 +22,14 @@ class Timing:
         self._lock = threading.Lock()
         self._seconds = dict.fromkeys(Part, 0.0)
 
-    def add(self, seconds: Mapping[Part, float]) -> None:
+    def measure(self, part: Part) -> "_Measured":
+        """Count the time until the end of a `with` block, errors included, to a part."""
+        return _Measured(self, part)
+
+    def add(self, part: Part, seconds: float) -> None:
         """Add what was measured."""
         with self._lock:
-            for part, value in seconds.items():
-                self._seconds[part] += value
+            self._seconds[part] += seconds
 
     def seconds(self) -> dict[Part, float]:
         """What has been added up so far."""
@@ -35,36 +37,16 @@ class Timing:
             return dict(self._seconds)
 
 
-class Stopwatch:
-    """Measures the parts of some work, in one thread."""
-
-    def __init__(self) -> None:
-        self.seconds = dict.fromkeys(Part, 0.0)
-
-    def measure(self, part: Part) -> "_Measured":
-        """Count the time until the end of a `with` block, errors included, to a part."""
-        return _Measured(self.seconds, part)
-
-
 class _Measured:
-    """A block of a stopwatch. Not a generator: it is entered for every clip, and is three times as fast."""
+    """A block that is measured. Not a generator: it is entered for every clip, and is three times as fast."""
 
-    __slots__ = ("_part", "_seconds", "_start")
+    __slots__ = ("_part", "_start", "_timing")
 
-    def __init__(self, seconds: dict[Part, float], part: Part):
-        self._seconds, self._part = seconds, part
+    def __init__(self, timing: Timing, part: Part):
+        self._timing, self._part = timing, part
 
     def __enter__(self) -> None:
         self._start = time.perf_counter()
 
     def __exit__(self, *_error: object) -> None:
-        self._seconds[self._part] += time.perf_counter() - self._start
-
-
-def total_seconds(watches: Iterable[Stopwatch]) -> dict[Part, float]:
-    """Seconds of several threads, added up by part."""
-    total = dict.fromkeys(Part, 0.0)
-    for watch in watches:
-        for part, seconds in watch.seconds.items():
-            total[part] += seconds
-    return total
+        self._timing.add(self._part, time.perf_counter() - self._start)

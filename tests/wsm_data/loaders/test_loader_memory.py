@@ -4,14 +4,16 @@ import gc
 import subprocess
 import sys
 import threading
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 from wsm_data.access.config import RemoteAccess
-from wsm_data.loaders.batches import buffers
+from wsm_data.loaders.batches.buffers import BufferPool
 from wsm_data.loaders.config import LoaderConfig, OrderConfig, ReadConfig, SourceConfig
 from wsm_data.loaders.loader import ClipLoader
+from wsm_data.loaders.reading import step_reader
 
 WARM_UP_EPOCHS, EPOCHS = 5, 20
 TOLERANCE_BYTES = 6 << 20
@@ -99,7 +101,8 @@ def test_epochs_that_are_broken_off_leave_nothing_behind(make_loader):
 
 def test_few_blocks_serve_all_batches(make_loader, monkeypatch):
     """One the caller holds, and those that are read ahead."""
-    monkeypatch.setattr(buffers, "_PATIENCE_S", 5.0)  # a busy machine may take long over a moment
+    patient = partial(BufferPool, patience_s=5.0)  # a busy machine may take long over a moment
+    monkeypatch.setattr(step_reader, "BufferPool", patient)
     loader = make_loader(threads=1, prefetch_batches=2, standardise=False, dtype="float16")
     _epochs(loader, 1)
     places = set()

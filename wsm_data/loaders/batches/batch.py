@@ -1,19 +1,18 @@
 """A batch: what it is for the model, and how it lies in one block of memory.
 
-All tensors of a batch are views of one block, so that it crosses to a device or to another process as a whole, and its
+All tensors of a batch are views of one block, so that it crosses to a device as a whole, and its
 memory is used again as a whole.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from math import prod
 from types import MappingProxyType
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import torch
 
-from wsm_data.loaders.timing import Part
 from wsm_data.schema.arrays import Int64Array
 from wsm_data.schema.batch import ClipBatch
 from wsm_data.schema.pose import POSE_VALUES
@@ -106,10 +105,6 @@ class BatchLayout:
                 found[name] = (place.offset, of_row, of_latent)
         return found
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Cross to another process as its sizes."""
-        return layout_of, (self.rows, self.row_latents, self.sequences, self.latent_shape, self.dtype)
-
     @property
     def size_bytes(self) -> int:
         """Bytes of the block that holds all tensors, a multiple of 64."""
@@ -129,40 +124,42 @@ def _aligned(offset: int) -> int:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class PackedBatch:
+class BatchBlock:
     """A batch as one block of memory.
 
     Attributes:
-        block: the memory; uint8 [layout.size_bytes], on any device.
+        memory: the block; uint8 [layout.size_bytes], on any device.
         layout: where each tensor lies in it.
         spans: where each sequence lies in the batch.
         refs: numbers of the clips; int64 [N].
         keys: keys of the clips.
         epoch: number of the epoch.
         step: number of the global step in the epoch.
-        seconds: time that each part of reading it took, s.
     """
 
-    block: torch.Tensor
+    memory: torch.Tensor
     layout: BatchLayout
     spans: tuple[SequenceSpan, ...]
     refs: Int64Array
     keys: tuple[str, ...]
     epoch: int
     step: int
-    seconds: Mapping[Part, float] = field(default_factory=dict)
 
+    @cached_property
+    def bytes(self) -> memoryview:
+        """The block as bytes; on the processor only."""
+        return memoryview(self.memory.numpy())
+
+    @cached_property
     def tensors(self) -> dict[str, torch.Tensor]:
         """The tensors of the batch by name, as views of the block."""
         places = self.layout.tensors
-        wholes = {dtype: self.block.view(dtype) for dtype in {place.dtype for place in places.values()}}
+        wholes = {dtype: self.memory.view(dtype) for dtype in {place.dtype for place in places.values()}}
         return {
             name: wholes[place.dtype].as_strided(place.shape, place.strides, place.offset // place.dtype.itemsize)
             for name, place in places.items()
         }
 
-    def unpacked(self) -> Batch:
+    def batch(self) -> Batch:
         """The batch itself; all tensors are views of the block."""
-        return Batch(
-            **self.tensors(), spans=self.spans, refs=self.refs, keys=self.keys, epoch=self.epoch, step=self.step
-        )
+        return Batch(**self.tensors, spans=self.spans, refs=self.refs, keys=self.keys, epoch=self.epoch, step=self.step)

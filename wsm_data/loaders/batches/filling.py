@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from wsm_data.loaders.batches.batch import LATENT_TENSORS, BatchLayout, layout_of
+from wsm_data.loaders.batches.batch import LATENT_TENSORS, BatchBlock, BatchLayout, layout_of
 from wsm_data.loaders.order.epoch_order import EpochOrder, chunk_sizes
 from wsm_data.loaders.reading.clip_places import ClipPlace
 from wsm_data.loaders.reading.clip_reads import POSE_BYTES
@@ -16,11 +16,12 @@ from wsm_data.schema.sequence import POSE_SLOTS, SequenceSpan, frame_table
 ANCHOR_SLOTS = POSE_SLOTS - 1
 """Slots of latent 0 that repeat the first pose: raw frame f of a clip lies in its slot `ANCHOR_SLOTS` + f."""
 
-_READ_TENSORS = ("rgb", "depth", "depth_valid", "poses")
+MEMBER_OF = {"rgb": "rgb_latent", "depth": "depth_latent", "depth_valid": "depth_valid", "poses": "poses"}
+"""Tensors of a batch that are read, and the members they are read from."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class ArrangedClip:
+class PlacedClip:
     """A sequence of a batch.
 
     Attributes:
@@ -32,7 +33,7 @@ class ArrangedClip:
     span: SequenceSpan
 
 
-def arrange(rows: Sequence[np.ndarray], places: Sequence[ClipPlace], epoch_order: EpochOrder) -> list[ArrangedClip]:
+def place_in_rows(rows: Sequence[np.ndarray], places: Sequence[ClipPlace], epoch_order: EpochOrder) -> list[PlacedClip]:
     """Lay the clips of each row one behind the other.
 
     Args:
@@ -40,19 +41,19 @@ def arrange(rows: Sequence[np.ndarray], places: Sequence[ClipPlace], epoch_order
         places: places of the clips of all rows.
         epoch_order: says how many latents are taken of each clip, and its chunk size.
     """
-    clips: list[ArrangedClip] = []
+    clips: list[PlacedClip] = []
     for row, refs in enumerate(rows):
         start = 0
         sizes = chunk_sizes(refs, epoch_order.config, epoch_order.epoch).tolist()
         for latents, size in zip(epoch_order.sequence_latents[refs].tolist(), sizes, strict=True):
             span = SequenceSpan(row=row, start=start, length=latents, chunk_size=size)
-            clips.append(ArrangedClip(place=places[len(clips)], span=span))
+            clips.append(PlacedClip(place=places[len(clips)], span=span))
             start = span.end
     return clips
 
 
 def batch_layout(
-    clips: Sequence[ArrangedClip],
+    clips: Sequence[PlacedClip],
     rows: int,
     epoch_order: EpochOrder,
     latent_shape: tuple[int, int, int],
@@ -63,37 +64,30 @@ def batch_layout(
     return layout_of(rows, epoch_order.config.row_latents or longest, len(clips), latent_shape, dtype)
 
 
-def slots_of(layout: BatchLayout, memory: memoryview, clip: ArrangedClip) -> dict[str, memoryview]:
+def slots_of(block: BatchBlock, clip: PlacedClip) -> dict[str, memoryview]:
     """Memory of a clip in each tensor that is read from its shard.
 
-    Args:
-        layout: of the batch.
-        memory: block of the batch, as bytes.
-        clip: the clip.
-
     Returns:
-        By name of the tensor, the bytes from the clip's first latent to its last; for `poses`, from raw frame 0 on.
+        By name of the member, the bytes from the clip's first latent to its last; for `poses`, from raw frame 0 on.
     """
     span = clip.span
-    slots = {name: memory[_stretch(layout, name, span.row, span.start, span.length)] for name in _READ_TENSORS}
+    slots = {
+        member: block.bytes[_stretch(block.layout, name, span.row, span.start, span.length)]
+        for name, member in MEMBER_OF.items()
+    }
     slots["poses"] = slots["poses"][ANCHOR_SLOTS * POSE_BYTES :]
     return slots
 
 
-def describe(
-    layout: BatchLayout,
-    memory: memoryview,
-    clips: Sequence[ArrangedClip],
-    goals: Sequence[np.ndarray],
-) -> None:
+def describe(block: BatchBlock, clips: Sequence[PlacedClip], goals: Sequence[np.ndarray]) -> None:
     """Fill in everything but what was read: masks, goals, anchors, and zeros where there is no clip.
 
     Args:
-        layout: of the batch.
-        memory: block of the batch, as bytes.
-        clips: the clips of the batch.
+        block: the batch.
+        clips: its clips.
         goals: last camera position of each, m; N of float32 [3].
     """
+    layout, memory = block.layout, block.bytes
     arrays = {name: _array(layout, memory, name) for name in layout.tensors if name not in LATENT_TENSORS}
     by_slot = (layout.rows, POSE_SLOTS * layout.row_latents)
     still, poses = arrays["still"].reshape(by_slot), arrays["poses"].reshape(*by_slot, POSE_VALUES)
@@ -115,7 +109,7 @@ def describe(
 def _clear(layout: BatchLayout, memory: memoryview, row: int, end: int) -> None:
     """Zeros behind the last sequence of a row."""
     unused = layout.row_latents - end
-    for name in _READ_TENSORS if unused else ():
+    for name in MEMBER_OF if unused else ():
         np.frombuffer(memory[_stretch(layout, name, row, end, unused)], np.uint8)[:] = 0
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import torch
 
 from wsm_data.errors import ConfigError
-from wsm_data.loaders.batches.batch import LATENT_DTYPES, Batch, PackedBatch
+from wsm_data.loaders.batches.batch import LATENT_DTYPES, Batch, BatchBlock
 from wsm_data.loaders.batches.standardise import Standardisation, standardisations
 from wsm_data.loaders.config import ReadConfig
 from wsm_data.schema.sequence import NO_SEQUENCE
@@ -30,14 +30,14 @@ def device_of(read: ReadConfig) -> torch.device:
     return device
 
 
-def open_transfer(read: ReadConfig, manifest: ReleaseManifest) -> Callable[[PackedBatch], Batch]:
+def open_transfer(read: ReadConfig, manifest: ReleaseManifest) -> Callable[[BatchBlock], Batch]:
     """What makes batches of blocks, to be called where blocks are read; latents must come as they are stored for a GPU.
 
     Raises:
         ConfigError: the device is not there.
     """
     device = device_of(read)
-    return PackedBatch.unpacked if device.type == "cpu" else CudaTransfer(device, read, manifest)
+    return BatchBlock.batch if device.type == "cpu" else CudaTransfer(device, read, manifest)
 
 
 class CudaTransfer:
@@ -52,10 +52,10 @@ class CudaTransfer:
         self._standardise = standardisations(manifest) if read.standardise else {}
         self._stream = torch.cuda.Stream(device)
 
-    def __call__(self, packed: PackedBatch) -> Batch:
+    def __call__(self, block: BatchBlock) -> Batch:
         """Copy and standardise a batch; its tensors are complete when this returns."""
         with torch.cuda.stream(self._stream):
-            batch = on_device(packed, self._device, self._dtype, self._standardise)
+            batch = on_device(block, self._device, self._dtype, self._standardise)
             done = torch.cuda.Event(blocking=True)
             done.record(self._stream)
         done.synchronize()
@@ -63,17 +63,17 @@ class CudaTransfer:
 
 
 def on_device(
-    packed: PackedBatch, device: torch.device, dtype: torch.dtype, standardise: Mapping[str, Standardisation]
+    block: BatchBlock, device: torch.device, dtype: torch.dtype, standardise: Mapping[str, Standardisation]
 ) -> Batch:
     """The batch on a device, its latents standardised there.
 
     Args:
-        packed: a batch with latents as they are stored.
+        block: a batch with latents as they are stored.
         device: where it goes.
         dtype: dtype of the latents.
         standardise: mean and scale of `rgb` and `depth`; without them, only the dtype changes. Padding stays zero.
     """
-    batch = replace(packed, block=packed.block.to(device, non_blocking=True)).unpacked()
+    batch = replace(block, memory=block.memory.to(device, non_blocking=True)).batch()
 
     padding = (batch.sequence_id == NO_SEQUENCE)[..., None, None, None]
 

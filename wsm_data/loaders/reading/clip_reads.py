@@ -4,7 +4,7 @@ The members that a batch needs stand one after the other in the shard, with thei
 read puts each of them where it belongs; what lies between goes into memory that nobody looks at.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from math import prod
 from operator import add, itemgetter
@@ -16,7 +16,7 @@ from wsm_data.access.clip_reader import read_until_whole, wrong_checksum, wrong_
 from wsm_data.access.shard_reader import ShardReader
 from wsm_data.errors import IntegrityError
 from wsm_data.loaders.reading.clip_places import READ_MEMBERS, ClipPlace
-from wsm_data.loaders.timing import Part, Stopwatch
+from wsm_data.loaders.timing import Part, Timing
 from wsm_data.schema.sequence import frames_of
 from wsm_data.shards.members import STORED_DTYPES, array_header, shape_of
 from wsm_data.shards.names import INDEX_NAME
@@ -34,10 +34,10 @@ def read_clip(
     reader: ShardReader,
     place: ClipPlace,
     latent_shape: tuple[int, int, int],
-    slots: Sequence[memoryview],
+    slots: Mapping[str, memoryview],
     *,
     checked: bool,
-    watch: Stopwatch,
+    timing: Timing,
 ) -> np.ndarray:
     """Read a clip, or a prefix of it, into slots.
 
@@ -45,9 +45,9 @@ def read_clip(
         reader: of the release's shards.
         place: the clip.
         latent_shape: channels, height and width of a latent.
-        slots: memory for the leading bytes of each of `READ_MEMBERS`, all of them or fewer.
+        slots: by name of each of `READ_MEMBERS`, memory for its leading bytes, all of them or fewer.
         checked: compare headers and checksums; for this, members are read to their end.
-        watch: measures the time of reading and of checking.
+        timing: adds up the time of reading and of checking.
 
     Returns:
         The last pose of the whole clip; float32 [7].
@@ -58,22 +58,23 @@ def read_clip(
     """
     shapes, sizes = _shapes_and_sizes(place.latents, latent_shape)
     _require_sound(place, sizes)
+    in_order = [slots[name] for name in READ_MEMBERS]
     headers = [memoryview(bytearray(size)) for size in place.gaps] if checked else []
-    tails = _tails(place, slots) if checked else _last_pose(place, slots)
-    pieces = _pieces(place, headers, slots, tails)
+    tails = _tails(place, in_order) if checked else _last_pose(place, in_order)
+    pieces = _pieces(place, headers, in_order, tails)
 
     def read() -> None:
-        with watch.measure(Part.STORE):
+        with timing.measure(Part.STORE):
             _fill(reader, place, pieces)
 
     def damage() -> str | None:
         if not checked:
             return None
-        with watch.measure(Part.CHECKSUM):
-            return _damage(place, shapes, headers, slots, tails)
+        with timing.measure(Part.CHECKSUM):
+            return _damage(place, shapes, headers, in_order, tails)
 
     read_until_whole(reader, place.shard, place.key, read=read, damage=damage)
-    return np.frombuffer((tails[-1] if tails[-1].nbytes else slots[-1])[-POSE_BYTES:], STORED_DTYPES["poses"])
+    return np.frombuffer((tails[-1] if tails[-1].nbytes else in_order[-1])[-POSE_BYTES:], STORED_DTYPES["poses"])
 
 
 def _tails(place: ClipPlace, slots: Sequence[memoryview]) -> list[memoryview]:

@@ -1,13 +1,11 @@
-import pickle
 from itertools import pairwise
 
 import numpy as np
-import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wsm_data.loaders.batches.batch import LATENT_DTYPES, PackedBatch, layout_of
+from wsm_data.loaders.batches.batch import LATENT_DTYPES, BatchBlock, layout_of
 from wsm_data.schema.sequence import SequenceSpan
 
 SPAN = SequenceSpan(row=0, start=0, length=1, chunk_size=4)
@@ -22,9 +20,9 @@ layouts = st.builds(
 )
 
 
-def _packed(layout, fill: int = 0) -> PackedBatch:
-    block = torch.full((layout.size_bytes,), fill, dtype=torch.uint8)
-    return PackedBatch(block=block, layout=layout, spans=(SPAN,), refs=np.array([5]), keys=("a/b/c",), epoch=2, step=7)
+def _block(layout, fill: int = 0) -> BatchBlock:
+    memory = torch.full((layout.size_bytes,), fill, dtype=torch.uint8)
+    return BatchBlock(memory=memory, layout=layout, spans=(SPAN,), refs=np.array([5]), keys=("a/b/c",), epoch=2, step=7)
 
 
 @given(layouts)
@@ -38,7 +36,7 @@ def test_tensors_lie_apart_and_aligned_within_the_block(layout):
 @given(layouts)
 def test_each_tensor_has_its_shape_and_dtype_and_is_contiguous(layout):
     rows, latents, (channels, height, width) = layout.rows, layout.row_latents, layout.latent_shape
-    batch = _packed(layout).unpacked()
+    batch = _block(layout).batch()
     for latent in (batch.rgb, batch.depth):
         assert (latent.shape, latent.dtype) == ((rows, latents, channels, height, width), layout.dtype)
     assert (batch.depth_valid.shape, batch.depth_valid.dtype) == ((rows, latents, height, width), torch.uint8)
@@ -52,18 +50,8 @@ def test_each_tensor_has_its_shape_and_dtype_and_is_contiguous(layout):
 
 
 def test_what_is_written_to_one_tensor_is_in_no_other():
-    packed = _packed(layout_of(3, 4, 5, (2, 3, 3), torch.float16))
-    for name, tensor in packed.tensors().items():
+    block = _block(layout_of(3, 4, 5, (2, 3, 3), torch.float16))
+    for name, tensor in block.tensors.items():
         tensor.fill_(1)
-        assert {other for other, values in packed.tensors().items() if values.any()} == {name}
+        assert {other for other, values in block.tensors.items() if values.any()} == {name}
         tensor.zero_()
-
-
-@pytest.mark.parametrize("dtype", LATENT_DTYPES.values())
-def test_a_packed_batch_crosses_to_another_process_as_one_block(dtype):
-    packed = _packed(layout_of(2, 3, 2, (2, 2, 2), dtype), fill=1)
-    copy = pickle.loads(pickle.dumps(packed))  # noqa: S301
-    assert torch.equal(copy.block, packed.block)
-    assert (copy.layout, copy.keys, copy.epoch, copy.step) == (packed.layout, packed.keys, packed.epoch, packed.step)
-    assert (copy.spans, copy.refs.tolist()) == (packed.spans, [5])
-    assert copy.layout.tensors == packed.layout.tensors

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 import torch
 
-from wsm_data.loaders.batches.batch import PackedBatch
-from wsm_data.loaders.batches.filling import arrange, batch_layout, describe, slots_of
+from wsm_data.loaders.batches.batch import BatchBlock
+from wsm_data.loaders.batches.filling import MEMBER_OF, batch_layout, describe, place_in_rows, slots_of
 from wsm_data.loaders.config import Arrangement, OrderConfig, SourceConfig
 from wsm_data.loaders.order.epoch_order import chunk_sizes
 from wsm_data.loaders.reading.clip_places import clip_places
@@ -22,9 +22,9 @@ def order_of(released):
     return make
 
 
-def _arranged(sources, epoch_order, step=0):
+def _placed(sources, epoch_order, step=0):
     rows = epoch_order.rows(step, 0, 1)
-    clips = arrange(rows, clip_places(sources, np.concatenate(rows)), epoch_order)
+    clips = place_in_rows(rows, clip_places(sources, np.concatenate(rows)), epoch_order)
     return rows, clips, batch_layout(clips, len(rows), epoch_order, LATENT_SHAPE, torch.float16)
 
 
@@ -36,7 +36,7 @@ def _arranged(sources, epoch_order, step=0):
 def test_the_clips_of_a_row_lie_one_behind_the_other(order_of, settings):
     sources, epoch_order = order_of(**settings)
     for step in range(epoch_order.steps):
-        rows, clips, layout = _arranged(sources, epoch_order, step)
+        rows, clips, layout = _placed(sources, epoch_order, step)
         assert [clip.place.key for clip in clips] == sources.keys(np.concatenate(rows))
         ends = dict.fromkeys(range(len(rows)), 0)
         for clip in clips:
@@ -50,10 +50,10 @@ def test_the_clips_of_a_row_lie_one_behind_the_other(order_of, settings):
 def test_slots_of_different_clips_and_tensors_lie_apart(order_of):
     """What is written through the slots of one clip arrives in its latents of each tensor, and nowhere else."""
     sources, epoch_order = order_of(arrangement=Arrangement.JOIN, row_latents=8, global_batch=2)
-    _, clips, layout = _arranged(sources, epoch_order)
+    _, clips, layout = _placed(sources, epoch_order)
     assert len(clips) > 2
-    packed = PackedBatch(
-        block=torch.zeros(layout.size_bytes, dtype=torch.uint8),
+    block = BatchBlock(
+        memory=torch.zeros(layout.size_bytes, dtype=torch.uint8),
         layout=layout,
         spans=(),
         refs=np.arange(0),
@@ -61,14 +61,14 @@ def test_slots_of_different_clips_and_tensors_lie_apart(order_of):
         epoch=0,
         step=0,
     )
-    memory = memoryview(packed.block.numpy())
     for clip in clips:
-        slots = slots_of(layout, memory, clip)
-        for name, slot in slots.items():
+        slots = slots_of(block, clip)
+        for name, member in MEMBER_OF.items():
+            slot = slots[member]
             slot[:] = bytes([1]) * slot.nbytes
-            written = packed.block.numpy().sum()
+            written = block.memory.numpy().sum()
             assert written == slot.nbytes
-            values = packed.tensors()[name]
+            values = block.tensors[name]
             own = values[clip.span.place]
             own = own.flatten(0, 1)[3:] if name == "poses" else own
             assert own.contiguous().view(torch.uint8).sum() == written
@@ -79,14 +79,15 @@ def test_describing_says_all_that_is_not_read_whatever_the_memory_held_before(or
     sources, epoch_order = order_of(arrangement=Arrangement.JOIN, row_latents=7, global_batch=2)
     padded = 0
     for step in range(epoch_order.steps):
-        rows, clips, layout = _arranged(sources, epoch_order, step)
-        block = torch.full((layout.size_bytes,), 255, dtype=torch.uint8)
+        rows, clips, layout = _placed(sources, epoch_order, step)
+        memory = torch.full((layout.size_bytes,), 255, dtype=torch.uint8)
         keys = tuple(clip.place.key for clip in clips)
         refs, spans = np.concatenate(rows), tuple(clip.span for clip in clips)
         goals = [released.clips[key].poses[-1, :3] for key in keys]
-        describe(layout, memoryview(block.numpy()), clips, goals)
         known = {"spans": spans, "refs": refs, "keys": keys, "epoch": 0, "step": step}
-        batch = PackedBatch(block=block, layout=layout, **known).unpacked()
+        block = BatchBlock(memory=memory, layout=layout, **known)
+        describe(block, clips, goals)
+        batch = block.batch()
         expected = expected_batch(batch, released.clips, row_latents=7)
         for name in ("still", "sequence_id", "latent_index", "goal_camera0_m"):
             np.testing.assert_array_equal(getattr(batch, name), expected[name], err_msg=name)

@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from wsm_data.errors import ConfigError
-from wsm_data.loaders.batches.batch import PackedBatch, layout_of
+from wsm_data.loaders.batches.batch import BatchBlock, layout_of
 from wsm_data.loaders.batches.standardise import standardisations
 from wsm_data.loaders.batches.transfer import device_of, hand_over, on_device, open_transfer
 from wsm_data.loaders.config import ReadConfig
@@ -15,21 +15,21 @@ needs_gpu = pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a GP
 
 
 @pytest.fixture
-def packed() -> PackedBatch:
+def block() -> BatchBlock:
     """Three rows of four latents, as they are stored."""
     layout = layout_of(3, 4, 2, (48, 6, 10), torch.float16)
-    block = torch.zeros(layout.size_bytes, dtype=torch.uint8)
+    memory = torch.zeros(layout.size_bytes, dtype=torch.uint8)
     known = {"spans": (), "refs": np.arange(2), "keys": ("a", "b"), "epoch": 1, "step": 2}
-    packed = PackedBatch(block=block, layout=layout, **known)
+    block = BatchBlock(memory=memory, layout=layout, **known)
     generator = torch.Generator().manual_seed(0)
     for name in ("rgb", "depth", "poses"):
-        tensor = packed.tensors()[name]
+        tensor = block.tensors[name]
         tensor.copy_(torch.randn(tensor.shape, generator=generator))
-    packed.tensors()["sequence_id"].fill_(0)
-    packed.tensors()["sequence_id"][2, 3:] = -1
+    block.tensors["sequence_id"].fill_(0)
+    block.tensors["sequence_id"][2, 3:] = -1
     for name in ("rgb", "depth", "poses"):
-        packed.tensors()[name][2, 3:] = 0
-    return packed
+        block.tensors[name][2, 3:] = 0
+    return block
 
 
 @pytest.mark.parametrize("device", ["abacus", "mps", "cuda:x"])
@@ -44,18 +44,18 @@ def test_a_gpu_that_is_not_there_is_refused(released):
         open_transfer(ReadConfig(device="cuda"), released.release.manifest)
 
 
-def test_on_the_processor_a_batch_is_its_block(released, packed):
-    batch = open_transfer(ReadConfig(), released.release.manifest)(packed)
-    assert batch.rgb.untyped_storage().data_ptr() == packed.block.untyped_storage().data_ptr()
+def test_on_the_processor_a_batch_is_its_block(released, block):
+    batch = open_transfer(ReadConfig(), released.release.manifest)(block)
+    assert batch.rgb.untyped_storage().data_ptr() == block.memory.untyped_storage().data_ptr()
     assert (batch.keys, batch.epoch, batch.step) == (("a", "b"), 1, 2)
     assert hand_over(batch) is batch
 
 
 @pytest.mark.parametrize("dtype", [torch.float32, torch.bfloat16, torch.float16], ids=str)
-def test_a_device_standardises_what_is_stored_and_leaves_padding_zero(released, packed, dtype):
+def test_a_device_standardises_what_is_stored_and_leaves_padding_zero(released, block, dtype):
     moments = standardisations(released.release.manifest)
-    batch = on_device(packed, CPU, dtype, moments)
-    stored = packed.unpacked()
+    batch = on_device(block, CPU, dtype, moments)
+    stored = block.batch()
     for name in ("rgb", "depth"):
         expected = moments[name].whole(getattr(stored, name), dtype)
         expected[2, 3:] = 0
@@ -64,9 +64,9 @@ def test_a_device_standardises_what_is_stored_and_leaves_padding_zero(released, 
     assert torch.equal(batch.poses, stored.poses)
 
 
-def test_without_moments_only_the_dtype_changes_on_a_device(packed):
-    batch = on_device(packed, CPU, torch.float32, {})
-    assert torch.equal(batch.rgb, packed.unpacked().rgb.float())
+def test_without_moments_only_the_dtype_changes_on_a_device(block):
+    batch = on_device(block, CPU, torch.float32, {})
+    assert torch.equal(batch.rgb, block.batch().rgb.float())
 
 
 @needs_gpu

@@ -10,7 +10,7 @@ from wsm_data.loaders.config import SourceConfig
 from wsm_data.loaders.reading.clip_places import READ_MEMBERS, ClipPlace, clip_places, frames_of
 from wsm_data.loaders.reading.clip_reads import MAX_GAP_BYTES, read_clip
 from wsm_data.loaders.sources.clips import open_sources
-from wsm_data.loaders.timing import Part, Stopwatch
+from wsm_data.loaders.timing import Part, Timing
 
 LATENT_SHAPE = (48, 6, 10)
 
@@ -45,10 +45,10 @@ def places(released) -> list[ClipPlace]:
     return clip_places(sources, np.arange(sources.clips))
 
 
-def _slots(place: ClipPlace, latents: int) -> list[memoryview]:
+def _slots(place: ClipPlace, latents: int) -> dict[str, memoryview]:
     whole = dict(zip(READ_MEMBERS, place.sizes, strict=True))
     sizes = [whole[name] // place.latents * latents for name in READ_MEMBERS[:3]] + [28 * frames_of(latents)]
-    return [memoryview(bytearray(size)) for size in sizes]
+    return {name: memoryview(bytearray(size)) for name, size in zip(READ_MEMBERS, sizes, strict=True)}
 
 
 @pytest.mark.parametrize("checked", [True, False])
@@ -58,9 +58,9 @@ def test_every_prefix_of_every_clip_is_read(released, places, checked):
         clip = released.clips[place.key]
         for latents in range(1, place.latents + 1):
             slots = _slots(place, latents)
-            last = read_clip(reader, place, LATENT_SHAPE, slots, checked=checked, watch=Stopwatch())
+            last = read_clip(reader, place, LATENT_SHAPE, slots, checked=checked, timing=Timing())
             arrays = (clip.rgb_latent[:latents], clip.depth_latent[:latents], clip.depth_valid[:latents])
-            for slot, array in zip(slots, (*arrays, clip.poses[: frames_of(latents)]), strict=True):
+            for slot, array in zip(slots.values(), (*arrays, clip.poses[: frames_of(latents)]), strict=True):
                 assert bytes(slot) == array.tobytes()
             np.testing.assert_array_equal(last, clip.poses[-1])
 
@@ -70,7 +70,7 @@ def test_a_whole_clip_is_one_read(released, places):
     for place in places:
         for checked in (True, False):
             slots = _slots(place, place.latents)
-            read_clip(reader, place, LATENT_SHAPE, slots, checked=checked, watch=Stopwatch())
+            read_clip(reader, place, LATENT_SHAPE, slots, checked=checked, timing=Timing())
     assert len(reader.reads) == 2 * len(places)
 
 
@@ -83,10 +83,10 @@ def test_a_prefix_that_is_not_checked_leaves_out_what_is_long(tmp_path, make_cli
     [place] = clip_places(sources, np.arange(1))
     reader = Watched(str(tmp_path / "release"))
     wanted = _slots(place, 1)
-    read_clip(reader, place, LATENT_SHAPE, wanted, checked=False, watch=Stopwatch())
+    read_clip(reader, place, LATENT_SHAPE, wanted, checked=False, timing=Timing())
     assert len(reader.reads) == 3
-    assert sum(reader.reads) < sum(slot.nbytes for slot in wanted) + MAX_GAP_BYTES
-    read_clip(reader, place, LATENT_SHAPE, _slots(place, 1), checked=True, watch=Stopwatch())
+    assert sum(reader.reads) < sum(slot.nbytes for slot in wanted.values()) + MAX_GAP_BYTES
+    read_clip(reader, place, LATENT_SHAPE, _slots(place, 1), checked=True, timing=Timing())
     assert reader.reads[3:] == [sum(place.sizes) + sum(place.gaps)]
 
 
@@ -94,20 +94,20 @@ def test_a_prefix_that_is_not_checked_leaves_out_what_is_long(tmp_path, make_cli
 def test_bytes_that_a_store_spoilt_are_read_again(released, places, spoilt):
     reader = Watched(str(released.folder), spoilt=spoilt)
     slots = _slots(places[0], places[0].latents)
-    read_clip(reader, places[0], LATENT_SHAPE, slots, checked=True, watch=Stopwatch())
-    assert bytes(slots[0]) == released.clips[places[0].key].rgb_latent.tobytes()
+    read_clip(reader, places[0], LATENT_SHAPE, slots, checked=True, timing=Timing())
+    assert bytes(slots["rgb_latent"]) == released.clips[places[0].key].rgb_latent.tobytes()
     assert (len(reader.reads), reader.forgotten) == (spoilt + 1, spoilt)
 
 
 def test_bytes_that_stay_spoilt_are_refused(released, places):
     reader = Watched(str(released.folder), spoilt=99)
     with pytest.raises(IntegrityError, match=f"clip {places[0].key}: the checksum of rgb_latent.npy must be"):
-        read_clip(reader, places[0], LATENT_SHAPE, _slots(places[0], 1), checked=True, watch=Stopwatch())
+        read_clip(reader, places[0], LATENT_SHAPE, _slots(places[0], 1), checked=True, timing=Timing())
     assert len(reader.reads) == MAX_READS
 
 
 def test_reading_and_checking_are_measured_apart(released, places):
-    watch = Stopwatch()
-    read_clip(Watched(str(released.folder)), places[0], LATENT_SHAPE, _slots(places[0], 1), checked=True, watch=watch)
-    assert watch.seconds[Part.STORE] > 0
-    assert watch.seconds[Part.CHECKSUM] > 0
+    timing = Timing()
+    read_clip(Watched(str(released.folder)), places[0], LATENT_SHAPE, _slots(places[0], 1), checked=True, timing=timing)
+    assert timing.seconds()[Part.STORE] > 0
+    assert timing.seconds()[Part.CHECKSUM] > 0

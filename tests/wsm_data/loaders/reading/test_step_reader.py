@@ -2,12 +2,12 @@ import numpy as np
 import pytest
 import torch
 
-from wsm_data.errors import ConfigError
 from wsm_data.loaders.batches.batch import Batch
 from wsm_data.loaders.config import Arrangement, ReadConfig, Remainder, SourceConfig
 from wsm_data.loaders.order.epoch_order import chunk_sizes
 from wsm_data.loaders.reading.step_reader import StepReader
 from wsm_data.loaders.sources.clips import open_sources
+from wsm_data.loaders.timing import Timing
 
 STORED = {"standardise": False, "dtype": "float16"}
 
@@ -70,34 +70,6 @@ def test_a_batch_of_padding_alone_has_one_latent_and_no_sequence(make_loader):
     assert last.goal_camera0_m.shape == (0, 3)
 
 
-def _standardised(stored: np.ndarray, mean: tuple[float, ...], std: tuple[float, ...]) -> np.ndarray:
-    column = (slice(None), None, None)
-    centred = stored.astype(np.float32) - np.array(mean).astype(np.float32)[column]
-    return centred * (1 / np.array(std)).astype(np.float32)[column]
-
-
-@pytest.mark.parametrize("dtype", ["float32", "bfloat16", "float16"])
-@pytest.mark.parametrize("threads", [0, 2])
-def test_latents_are_standardised_to_the_bit_and_padding_stays_zero(
-    released, make_loader, expected_batch, dtype, threads
-):
-    manifest = released.release.manifest
-    moments = {"rgb": manifest.rgb_statistics, "depth": manifest.depth_statistics}
-    for batch in make_loader(dtype=dtype, threads=threads):
-        expected = expected_batch(batch, released.clips)
-        for name, statistics in moments.items():
-            values = _standardised(expected.pop(name), statistics.mean, statistics.std)
-            values[expected["sequence_id"] < 0] = 0
-            assert torch.equal(getattr(batch, name), torch.from_numpy(values).to(getattr(torch, dtype)))
-        _require_equal(batch, expected)
-
-
-def test_without_standardising_only_the_dtype_changes(released, make_loader, expected_batch):
-    for batch in make_loader(standardise=False, dtype="float32"):
-        expected = expected_batch(batch, released.clips)
-        assert torch.equal(batch.rgb, torch.from_numpy(expected["rgb"]).float())
-
-
 def test_stored_latents_come_without_a_copy(released, make_loader):
     """The arrays of a batch lie in the one block that its clips were read into."""
     batch = next(iter(make_loader(**STORED)))
@@ -105,14 +77,8 @@ def test_stored_latents_come_without_a_copy(released, make_loader):
     assert len({tensor.untyped_storage().data_ptr() for tensor in tensors}) == 1
 
 
-def test_a_dtype_that_latents_cannot_have_is_refused(released):
-    sources = open_sources([SourceConfig(release=str(released.folder))])
-    with pytest.raises(ConfigError, match="dtype must be one of float32, bfloat16, float16, found 'int8'"):
-        StepReader(sources, ReadConfig(dtype="int8"), rank=0, world_size=1)
-
-
 def test_two_sources_of_one_release_share_its_reader(released):
     sources = open_sources([SourceConfig(release=str(released.folder)), SourceConfig(release=str(released.folder))])
-    reader = StepReader(sources, ReadConfig(), rank=0, world_size=1)
-    assert reader._readers[0] is reader._readers[1]
+    reader = StepReader(sources, ReadConfig(), Timing(), rank=0, world_size=1)
+    assert reader.readers[0] is reader.readers[1]
     reader.close()

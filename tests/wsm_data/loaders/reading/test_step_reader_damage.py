@@ -17,8 +17,10 @@ from wsm_data.files.digest import sha256_file
 from wsm_data.loaders.config import OrderConfig, ReadConfig, SourceConfig
 from wsm_data.loaders.order.epoch_order import EpochOrder
 from wsm_data.loaders.reading.clip_places import READ_MEMBERS
+from wsm_data.loaders.reading.prefetch import done_alone
 from wsm_data.loaders.reading.step_reader import StepReader
 from wsm_data.loaders.sources.clips import open_sources
+from wsm_data.loaders.timing import Timing
 from wsm_data.shards.index import write_index
 from wsm_data.shards.index_row import IndexRow, row_record
 from wsm_data.shards.manifest import manifest_bytes
@@ -42,11 +44,11 @@ def _read_all(folder: Path, **settings: object) -> dict[str, str]:
     """Reads every clip in a step of its own; returns the messages of those that were refused, by key."""
     sources = open_sources([SourceConfig(release=str(folder))])
     epoch_order: EpochOrder = sources.order_epoch(OrderConfig(global_batch=1, shuffle=False), 0)
-    reader = StepReader(sources, ReadConfig(**settings), rank=0, world_size=1)
+    reader = StepReader(sources, ReadConfig(**settings), Timing(), rank=0, world_size=1)
     refused: dict[str, str] = {}
     for step in range(epoch_order.steps):
         try:
-            reader.read(epoch_order, step)
+            done_alone(reader.begin(epoch_order, step, lambda block: block))
         except IntegrityError as error:
             refused[sources.keys(epoch_order.rows(step, 0, 1)[0])[0]] = str(error)
     reader.close()
@@ -124,10 +126,10 @@ def test_a_prefix_vouches_for_the_whole_member_the_first_time(folder, victim, da
     damage(folder, victim)
     sources = open_sources([SourceConfig(release=str(folder))])
     epoch_order = sources.order_epoch(OrderConfig(global_batch=1, shuffle=False, max_latents=max_latents), 0)
-    reader = StepReader(sources, ReadConfig(verify="first"), rank=0, world_size=1)
+    reader = StepReader(sources, ReadConfig(verify="first"), Timing(), rank=0, world_size=1)
     step = sources.keys(range(sources.clips)).index(victim.key)
     with pytest.raises(IntegrityError, match=f"clip {victim.key}: the checksum"):
-        reader.read(epoch_order, step)
+        done_alone(reader.begin(epoch_order, step, lambda block: block))
 
 
 def test_damage_that_is_read_again_is_refused_again(folder, victim):
@@ -135,11 +137,11 @@ def test_damage_that_is_read_again_is_refused_again(folder, victim):
     _flip(0, "first byte")(folder, victim)
     sources = open_sources([SourceConfig(release=str(folder))])
     epoch_order = sources.order_epoch(OrderConfig(global_batch=1, shuffle=False), 0)
-    reader = StepReader(sources, ReadConfig(verify="first"), rank=0, world_size=1)
+    reader = StepReader(sources, ReadConfig(verify="first"), Timing(), rank=0, world_size=1)
     step = sources.keys(range(sources.clips)).index(victim.key)
     for _ in range(2):
         with pytest.raises(IntegrityError, match="checksum"):
-            reader.read(epoch_order, step)
+            done_alone(reader.begin(epoch_order, step, lambda block: block))
 
 
 def test_a_missing_shard_is_named_with_each_of_its_clips(folder, victim, released):

@@ -6,8 +6,7 @@ import pytest
 
 from wsm_data.access.config import RemoteAccess
 from wsm_data.loaders.config import ReadConfig
-from wsm_data.loaders.reading.stream import open_stream
-from wsm_data.loaders.timing import Timing
+from wsm_data.loaders.reading.delivery import deliver
 
 
 class Recorder:
@@ -19,16 +18,16 @@ class Recorder:
     def announce(self, epoch_order, step):
         self.told.append(("announced", step))
 
-    def begin(self, epoch_order, step):
+    def begin(self, epoch_order, step, finish):
         self.told.append(("read", step))
-        return SimpleNamespace(parts=0, complete=lambda: SimpleNamespace(seconds={}))
+        return SimpleNamespace(parts=0, complete=lambda: finish(step))
 
 
 def run(steps, **settings):
     recorder = Recorder()
     epoch_order = SimpleNamespace(config=SimpleNamespace(global_batch=4096))
     read = ReadConfig(threads=0, **settings)
-    list(open_stream(recorder, lambda packed: packed, epoch_order, steps, read, Timing(), inline=False))
+    list(deliver(recorder, lambda step: step, epoch_order, steps, read, inline=False))
     return recorder.told
 
 
