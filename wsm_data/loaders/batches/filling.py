@@ -21,7 +21,7 @@ MEMBER_OF = {"rgb": "rgb_latent", "depth": "depth_latent", "depth_valid": "depth
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class PlacedClip:
+class BatchSequence:
     """A sequence of a batch.
 
     Attributes:
@@ -33,7 +33,9 @@ class PlacedClip:
     span: SequenceSpan
 
 
-def place_in_rows(rows: Sequence[np.ndarray], places: Sequence[ClipPlace], epoch_order: EpochOrder) -> list[PlacedClip]:
+def sequences_of_rows(
+    rows: Sequence[np.ndarray], places: Sequence[ClipPlace], epoch_order: EpochOrder
+) -> list[BatchSequence]:
     """Lay the clips of each row one behind the other.
 
     Args:
@@ -41,19 +43,19 @@ def place_in_rows(rows: Sequence[np.ndarray], places: Sequence[ClipPlace], epoch
         places: places of the clips of all rows.
         epoch_order: says how many latents are taken of each clip, and its chunk size.
     """
-    clips: list[PlacedClip] = []
+    clips: list[BatchSequence] = []
     for row, refs in enumerate(rows):
         start = 0
         sizes = chunk_sizes(refs, epoch_order.config, epoch_order.epoch).tolist()
         for latents, size in zip(epoch_order.sequence_latents[refs].tolist(), sizes, strict=True):
             span = SequenceSpan(row=row, start=start, length=latents, chunk_size=size)
-            clips.append(PlacedClip(place=places[len(clips)], span=span))
+            clips.append(BatchSequence(place=places[len(clips)], span=span))
             start = span.end
     return clips
 
 
 def batch_layout(
-    clips: Sequence[PlacedClip],
+    clips: Sequence[BatchSequence],
     rows: int,
     epoch_order: EpochOrder,
     latent_shape: tuple[int, int, int],
@@ -64,7 +66,7 @@ def batch_layout(
     return layout_of(rows, epoch_order.config.row_latents or longest, len(clips), latent_shape, dtype)
 
 
-def slots_of(block: BatchBlock, clip: PlacedClip) -> dict[str, memoryview]:
+def slots_of(block: BatchBlock, clip: BatchSequence) -> dict[str, memoryview]:
     """Memory of a clip in each tensor that is read from its shard.
 
     Returns:
@@ -79,7 +81,7 @@ def slots_of(block: BatchBlock, clip: PlacedClip) -> dict[str, memoryview]:
     return slots
 
 
-def describe(block: BatchBlock, clips: Sequence[PlacedClip], goals: Sequence[np.ndarray]) -> None:
+def describe(block: BatchBlock, clips: Sequence[BatchSequence], goals: Sequence[np.ndarray]) -> None:
     """Fill in everything but what was read: masks, goals, anchors, and zeros where there is no clip.
 
     Args:

@@ -11,7 +11,7 @@ import torch
 from wsm_data.access.shard_reader import ShardReader
 from wsm_data.errors import ConfigError
 from wsm_data.loaders.batches.batch import LATENT_DTYPES, LATENT_TENSORS, BatchBlock
-from wsm_data.loaders.batches.filling import MEMBER_OF, PlacedClip, slots_of
+from wsm_data.loaders.batches.filling import MEMBER_OF, BatchSequence, slots_of
 from wsm_data.loaders.batches.standardise import convert, standardisations
 from wsm_data.loaders.config import ReadConfig
 from wsm_data.loaders.reading.clip_reads import read_clip
@@ -61,7 +61,7 @@ class ClipFiller:
         self._readers, self._timing = readers, timing
         self._staging = threading.local()
 
-    def fill(self, block: BatchBlock, clip: PlacedClip) -> np.ndarray:
+    def fill(self, block: BatchBlock, clip: BatchSequence) -> np.ndarray:
         """Read one clip into its batch.
 
         Returns:

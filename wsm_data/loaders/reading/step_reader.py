@@ -10,7 +10,7 @@ from wsm_data.access.open_shards import open_shards
 from wsm_data.access.shard_reader import ShardReader, Span
 from wsm_data.loaders.batches.batch import BatchBlock
 from wsm_data.loaders.batches.buffers import BufferPool, allocator
-from wsm_data.loaders.batches.filling import PlacedClip, batch_layout, describe, place_in_rows
+from wsm_data.loaders.batches.filling import BatchSequence, batch_layout, describe, sequences_of_rows
 from wsm_data.loaders.config import ReadConfig
 from wsm_data.loaders.order.epoch_order import EpochOrder
 from wsm_data.loaders.reading.clip_filler import ClipFiller
@@ -70,7 +70,7 @@ class StepReader:
         with self._timing.measure(Part.COLLATE):
             rows = self._rows(epoch_order, step)
             refs = np.concatenate(rows)
-            clips = place_in_rows(rows, clip_places(self._sources, refs), epoch_order)
+            clips = sequences_of_rows(rows, clip_places(self._sources, refs), epoch_order)
             layout = batch_layout(clips, len(rows), epoch_order, self._filler.latent_shape, self._filler.dtype)
             block = BatchBlock(
                 memory=self._pool.take(layout.size_bytes),
@@ -98,7 +98,7 @@ class StepWork(Generic[Delivered]):
     def __init__(
         self,
         block: BatchBlock,
-        clips: Sequence[PlacedClip],
+        clips: Sequence[BatchSequence],
         filler: ClipFiller,
         finish: Callable[[BatchBlock], Delivered],
         timing: Timing,

@@ -3,7 +3,7 @@ import pytest
 import torch
 
 from wsm_data.loaders.batches.batch import BatchBlock
-from wsm_data.loaders.batches.filling import MEMBER_OF, batch_layout, describe, place_in_rows, slots_of
+from wsm_data.loaders.batches.filling import MEMBER_OF, batch_layout, describe, sequences_of_rows, slots_of
 from wsm_data.loaders.config import Arrangement, OrderConfig, SourceConfig
 from wsm_data.loaders.order.epoch_order import chunk_sizes
 from wsm_data.loaders.reading.clip_places import clip_places
@@ -24,7 +24,7 @@ def order_of(released):
 
 def _placed(sources, epoch_order, step=0):
     rows = epoch_order.rows(step, 0, 1)
-    clips = place_in_rows(rows, clip_places(sources, np.concatenate(rows)), epoch_order)
+    clips = sequences_of_rows(rows, clip_places(sources, np.concatenate(rows)), epoch_order)
     return rows, clips, batch_layout(clips, len(rows), epoch_order, LATENT_SHAPE, torch.float16)
 
 
