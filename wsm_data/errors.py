@@ -18,6 +18,7 @@ class Reason(StrEnum):
     ARCHIVE_CORRUPT = "archive.corrupt"
     ARCHIVE_UNSAFE_MEMBER = "archive.unsafe_member"
     FILE_UNREADABLE = "file.unreadable"  # the system refuses: a link that leads nowhere, no permission, a broken disk
+    FILE_LINK_LOOP = "file.link_loop"
     CONTAINER_NO_EPISODES = "container.no_episodes"
     CONTAINER_SEVERAL_SCENES = "container.several_scenes"
 

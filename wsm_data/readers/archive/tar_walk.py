@@ -1,42 +1,14 @@
 """One sequential pass over a gzip tar, at the speed of the decompressor: nothing is extracted, nothing sought."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 from wsm_data.errors import DataError, Reason
 from wsm_data.readers.archive.gzip_stream import GzipStream, open_gzip
+from wsm_data.readers.archive.member import Member
 from wsm_data.readers.archive.tar_header import BLOCK_BYTES, ZERO_BLOCK, TarHeader, long_name, parse_header, parse_pax
 
 _MAX_RECORD_BYTES = 1 << 20
-
-
-@dataclass(frozen=True, slots=True)
-class Member:
-    """A file of a container.
-
-    Attributes:
-        name: its path, with `/`.
-        size: bytes of its content.
-        data: the content. From an archive it is a view into a reused buffer, valid until the next member is asked for:
-            whoever keeps it takes `bytes(member.data)`.
-        refusal: why the system did not give the content, if so; the data is then empty.
-    """
-
-    name: str
-    size: int
-    data: memoryview
-    refusal: DataError | None = None
-
-    def content(self) -> memoryview:
-        """The data.
-
-        Raises:
-            DataError: `file.unreadable`.
-        """
-        if self.refusal is not None:
-            raise self.refusal
-        return self.data
 
 
 def walk_tar(path: Path, where: str, wanted: Callable[[str], bool]) -> Iterator[Member]:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from wsm_data.errors import DataError, Reason
 from wsm_data.files.digest import xxh3_128
-from wsm_data.readers.archive.tar_walk import Member
+from wsm_data.readers.archive.member import Member
 from wsm_data.readers.images import check_jpeg, check_png16
 from wsm_data.readers.interndata.episode_meta import read_image_spans, read_lengths
 from wsm_data.readers.interndata.naming import ImageSpan, Kind, Role, role_of

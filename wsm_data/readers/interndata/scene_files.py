@@ -6,10 +6,11 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from wsm_data.errors import DataError, Reason
-from wsm_data.readers.archive.tar_walk import Member, walk_tar
+from wsm_data.readers.archive.folder_walk import file_member, walk_folder
+from wsm_data.readers.archive.member import Member
+from wsm_data.readers.archive.tar_walk import walk_tar
 from wsm_data.readers.interndata.containers import CONTENT_FOLDERS, SCENE_CLOUD, is_unfinished
 from wsm_data.readers.source import Container
-from wsm_data.readers.unreadable import read_file, refusing_unreadable
 from wsm_data.schema.layout import Layout
 
 _READ_FOLDER = re.compile(r"data|meta|videos|(data|videos)/[^/]+|videos/[^/]+/observation\.images\.(rgb|depth)")
@@ -28,7 +29,10 @@ def iter_members(source: Path, container: Container, wanted: Callable[[str], boo
     if container.layout == Layout.SCENE_ARCHIVE:
         yield from _from_archive(source, container, wanted)
     else:
-        yield from _from_folder(source / container.id, container.id, wanted)
+        root = source / container.id
+        yield from walk_folder(
+            root, container.id, CONTENT_FOLDERS, wanted, lambda name: bool(_READ_FOLDER.fullmatch(name))
+        )
 
 
 def scene_cloud(source: Path, container: Container) -> Member | None:
@@ -36,45 +40,7 @@ def scene_cloud(source: Path, container: Container) -> Member | None:
     path = (source / container.id).parent / SCENE_CLOUD
     if not os.path.lexists(path):
         return None
-    return _member(str(path), f"../{SCENE_CLOUD}", f"{container.id}:../{SCENE_CLOUD}")
-
-
-def _from_folder(root: Path, where: str, wanted: Callable[[str], bool]) -> Iterator[Member]:
-    with refusing_unreadable(where):
-        present = {path.name for path in root.iterdir()}
-    for content in (name for name in CONTENT_FOLDERS if name in present):
-        for name in _walk(root, content, where):
-            if wanted(name):
-                yield _member(f"{root}/{name}", name, f"{where}:{name}")
-            elif _READ_FOLDER.fullmatch(name):
-                with refusing_unreadable(f"{where}:{name}"):
-                    (root / name).stat()
-
-
-def _walk(root: Path, content: str, where: str) -> Iterator[str]:
-    """Names of all files, in sorted order; a folder that cannot be reached looks like a file."""
-
-    def refuse(error: OSError) -> None:
-        with refusing_unreadable(f"{where}:{Path(error.filename).relative_to(root).as_posix()}"):
-            raise error
-
-    with refusing_unreadable(f"{where}:{content}"):
-        is_folder = (root / content).is_dir()
-    if not is_folder:
-        yield content
-        return
-    for folder, subfolders, files in os.walk(root / content, followlinks=True, onerror=refuse):
-        subfolders.sort()
-        prefix = Path(folder).relative_to(root).as_posix()
-        yield from (f"{prefix}/{file}" for file in sorted(files))
-
-
-def _member(path: str, name: str, where: str) -> Member:
-    try:
-        data = read_file(path, where)
-    except DataError as refusal:
-        return Member(name, 0, memoryview(b""), refusal)
-    return Member(name, len(data), memoryview(data))
+    return file_member(str(path), f"../{SCENE_CLOUD}", f"{container.id}:../{SCENE_CLOUD}")
 
 
 def _from_archive(source: Path, container: Container, wanted: Callable[[str], bool]) -> Iterator[Member]:
