@@ -57,6 +57,9 @@ class Reason(StrEnum):
     TRAJECTORY_UNMATCHED = "trajectory.unmatched"
     TRAJECTORY_DEGENERATE = "trajectory.degenerate"
 
+    # episodes of a simulation
+    START_BLOCKED = "start.blocked"
+
     # point clouds and maps
     CLOUD_MISSING = "cloud.missing"  # a note when the map is fused from depth instead
     CLOUD_UNREADABLE = "cloud.unreadable"
