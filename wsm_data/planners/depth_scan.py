@@ -65,7 +65,7 @@ def scan_depth(depth_m: Float32Array, intrinsics: Intrinsics, config: ScanConfig
     numbers = np.array([intrinsics.fx, intrinsics.fy, intrinsics.cx, intrinsics.cy])
     heights = np.array([config.camera_height_m, config.ground_clearance_m, config.robot_height_m])
     points, free, hit = _scan(np.ascontiguousarray(depth_m), numbers, heights, config.range_m)
-    slopes = -(np.arange(0, intrinsics.width, _EVERY_PX) - intrinsics.cx) / intrinsics.fx
+    slopes = -(np.arange(0.0, intrinsics.width, _EVERY_PX, dtype=np.float64) - intrinsics.cx) / intrinsics.fx
     return DepthScan(obstacles_xy_m=points, ray_slopes=slopes, free_x_m=free, hit=hit)
 
 
