@@ -4,25 +4,33 @@ One row per query: a policy dreams several futures from one latent of a clip. Ev
 what it must hold is fixed here (docs/curation.md has the table of columns).
 """
 
-import json
+from functools import partial
 from pathlib import Path
 
 import fsspec
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
-import pyarrow.parquet as pq
 
 from wsm_data.curation.scores_table import Direction, ScorerInfo
-from wsm_data.errors import ConfigError, IntegrityError
-from wsm_data.files.jsonlines import canonical_json
+from wsm_data.errors import ConfigError
+from wsm_data.files.tables import opened_table, read_statement, require_columns, with_statement
 from wsm_data.schema.arrays import Float64Array
 from wsm_data.shards.index import IndexTable
 
 ROLLOUTS_VERSION = 1
-_METADATA_KEY = b"wsm.rollouts"
+_STATEMENT = "wsm.rollouts"
 _QUERY = ("key", "replan_latent", "policy")
 _NUMBERS = ("unsafe_share", "mean_cost_m2", "ate_m", "fm_loss")
+_SCHEMA = pa.schema(
+    [
+        ("key", pa.string()),
+        ("replan_latent", pa.int32()),
+        ("policy", pa.string()),
+        ("dreams", pa.int32()),
+        *((name, pa.float64()) for name in _NUMBERS),
+    ]
+)
 
 _NO_ROLLOUTS = "the clip was not rolled out"
 ROLLOUT_SCORES: tuple[ScorerInfo, ...] = (
@@ -67,16 +75,7 @@ ROLLOUT_SCORES: tuple[ScorerInfo, ...] = (
 
 def rollout_schema(release_digest: str) -> pa.Schema:
     """Columns and metadata of a table of rollouts of one release."""
-    return pa.schema(
-        [
-            ("key", pa.string()),
-            ("replan_latent", pa.int32()),
-            ("policy", pa.string()),
-            ("dreams", pa.int32()),
-            *((name, pa.float64()) for name in _NUMBERS),
-        ],
-        metadata={_METADATA_KEY: canonical_json({"version": ROLLOUTS_VERSION, "release_digest": release_digest})},
-    )
+    return with_statement(_SCHEMA, _STATEMENT, {"version": ROLLOUTS_VERSION, "release_digest": release_digest})
 
 
 def read_rollouts(location: str | Path, release_digest: str, index: IndexTable) -> pa.Table:
@@ -136,20 +135,14 @@ def rollout_scores(rollouts: pa.Table, keys: pa.ChunkedArray) -> dict[str, Float
 
 
 def _load(where: str, release_digest: str) -> pa.Table:
-    filesystem, path = fsspec.core.url_to_fs(where)
     try:
-        with filesystem.open(path, "rb") as file:
-            table = pq.read_table(file, page_checksum_verification=True)
-        record = json.loads((table.schema.metadata or {}).get(_METADATA_KEY, b"{}"))
-        if record.get("version") != ROLLOUTS_VERSION:
-            raise ValueError(f"wsm.rollouts must say version {ROLLOUTS_VERSION}, found {record.get('version')!r}")
-        found = str(record["release_digest"])
-        if table.schema != rollout_schema(found):
-            raise ValueError(f"its columns must be those of docs/curation.md, found {table.schema.names}")
+        must_be = f"{where} must be a table of rollouts"
+        with opened_table(partial(fsspec.open, where, "rb"), must_be, "write it again") as file:
+            found = read_statement(file.schema_arrow, _STATEMENT, ROLLOUTS_VERSION)["release_digest"]
+            require_columns(file.schema_arrow, _SCHEMA)
+            table = file.read()
     except FileNotFoundError as error:
         raise ConfigError(f"there are no rollouts at {where}; evaluate a policy on this release first") from error
-    except (pa.ArrowException, OSError, ValueError, KeyError) as error:
-        raise IntegrityError(f"{where} must be a table of rollouts, but: {error}; write it again") from error
     if found != release_digest:
         raise ConfigError(
             f"{where} must be of this release, with digest {release_digest}, found {found}; evaluate on this release"

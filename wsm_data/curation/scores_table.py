@@ -6,11 +6,11 @@ digest of the release it belongs to. An absent value is null in the file and NaN
 that say what their absence means.
 """
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 
 import fsspec
@@ -21,17 +21,16 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from wsm_data.curation.path_outline import PATH_POINTS, Outlines
-from wsm_data.errors import ConfigError, IntegrityError
-from wsm_data.files.atomic import atomic_file
+from wsm_data.errors import ConfigError
 from wsm_data.files.json_values import from_json, to_json
-from wsm_data.files.jsonlines import canonical_json
+from wsm_data.files.tables import opened_table, read_statement, require_columns, with_statement, write_table
 from wsm_data.files.typed_toml import did_you_mean
 from wsm_data.schema.arrays import Float32Array, Float64Array, require_array, require_finite
 
 SCORES_VERSION = 2
 KEY_COLUMN, PATH_COLUMN, FLOOR_COLUMN = "key", "path_xy_m", "floor_z_m"
 
-_METADATA_KEY = b"wsm.scores"
+_STATEMENT = "wsm.scores"
 _POINT_DTYPE = np.dtype("<f4")
 _PATH_BYTES = PATH_POINTS * 2 * _POINT_DTYPE.itemsize
 """An outline is stored as one value of so many bytes: a list of numbers takes several times as long to read."""
@@ -119,15 +118,13 @@ def write_scores(path: Path, table: ScoreTable, outlines: Outlines) -> None:
     arrays = [table.keys, *_stored_outlines(outlines, len(table))]
     arrays += [pa.array(values, from_pandas=True) for values in table.columns.values()]
     stored = pa.Table.from_arrays(arrays, schema=_schema(table.release_digest, table.scorers))
-    with atomic_file(path) as file:
-        pq.write_table(
-            stored,
-            file,
-            write_page_checksum=True,
-            row_group_size=_ROW_GROUP_ROWS,
-            compression={name: "zstd" if name == KEY_COLUMN else "none" for name in stored.column_names},
-            use_dictionary=False,
-        )
+    write_table(
+        path,
+        stored,
+        row_group_size=_ROW_GROUP_ROWS,
+        compression={name: "zstd" if name == KEY_COLUMN else "none" for name in stored.column_names},
+        use_dictionary=False,
+    )
 
 
 def read_scores(
@@ -225,14 +222,10 @@ def require_sound_values(table: ScoreTable, where: str) -> None:
 
 
 def _schema(release_digest: str, scorers: Sequence[ScorerInfo]) -> pa.Schema:
-    record = {
-        "version": SCORES_VERSION,
-        "release_digest": release_digest,
-        "scorers": to_json(scorers),
-    }
+    statement = {"version": SCORES_VERSION, "release_digest": release_digest, "scorers": to_json(scorers)}
     columns = [(KEY_COLUMN, pa.string()), (PATH_COLUMN, pa.binary(_PATH_BYTES)), (FLOOR_COLUMN, pa.float32())]
     columns += [(one.name, pa.float64()) for one in scorers]
-    return pa.schema(columns, metadata={_METADATA_KEY: canonical_json(record)})
+    return with_statement(pa.schema(columns), _STATEMENT, statement)
 
 
 def _stored_outlines(outlines: Outlines, clips: int) -> list[pa.Array]:
@@ -262,25 +255,19 @@ def _load(where: str, only: Sequence[str] | None) -> tuple[pa.Table, str, tuple[
 
 @contextmanager
 def _open(where: str) -> Iterator[pq.ParquetFile]:
-    filesystem, path = fsspec.core.url_to_fs(where)
+    must_be = f"{where} must be a table of scores"
     try:
-        with filesystem.open(path, "rb") as handle, pq.ParquetFile(handle, page_checksum_verification=True) as file:
+        with opened_table(partial(fsspec.open, where, "rb"), must_be, "run `wsm score` again") as file:
             yield file
     except FileNotFoundError as error:
         raise ConfigError(f"there are no scores at {where}; run `wsm score RELEASE` first") from error
-    except (pa.ArrowException, OSError, ValueError, TypeError, KeyError) as error:
-        raise IntegrityError(f"{where} must be a table of scores, but: {error}; run `wsm score` again") from error
 
 
 def _parse_metadata(schema: pa.Schema) -> tuple[str, tuple[ScorerInfo, ...]]:
-    record = json.loads((schema.metadata or {}).get(_METADATA_KEY, b"{}"))
-    if record.get("version") != SCORES_VERSION:
-        raise ValueError(f"its version must be {SCORES_VERSION}, found {record.get('version')!r}; use a matching wsm")
-    scorers = tuple(from_json(ScorerInfo, one) for one in record["scorers"])
-    wanted = _schema(record["release_digest"], scorers)
-    if schema != wanted:
-        raise ValueError(f"its columns must be {wanted.names} of text and float64, found {schema.names}")
-    return str(record["release_digest"]), scorers
+    statement = read_statement(schema, _STATEMENT, SCORES_VERSION)
+    scorers = tuple(from_json(ScorerInfo, one) for one in statement["scorers"])
+    require_columns(schema, _schema(statement["release_digest"], scorers))
+    return str(statement["release_digest"]), scorers
 
 
 def _chosen(scorers: Sequence[ScorerInfo], only: Sequence[str] | None, where: str) -> tuple[ScorerInfo, ...]:

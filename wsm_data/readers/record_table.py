@@ -1,16 +1,15 @@
 """Episode records in a parquet file: the same records give the same bytes, and come back equal to the last bit."""
 
-import io
 from collections.abc import Iterable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from wsm_data.errors import IntegrityError
-from wsm_data.files.atomic import write_bytes
+from wsm_data.files.tables import opened_table, read_full, write_table
 from wsm_data.schema.camera import Intrinsics
 from wsm_data.schema.episode import EpisodeRecord
 from wsm_data.schema.identity import EpisodeId
@@ -45,27 +44,22 @@ _SCHEMA = pa.schema(
 def write_records(path: Path, records: Iterable[EpisodeRecord]) -> None:
     """Write records atomically, in the given order."""
     rows = list(records)
-    columns = []
-    for field in _SCHEMA:
-        columns.append(pa.array([_cell(row, field.name) for row in rows], field.type))
-    buffer = io.BytesIO()
-    pq.write_table(pa.Table.from_arrays(columns, schema=_SCHEMA), buffer, compression="zstd")
-    write_bytes(path, buffer.getvalue())
+    columns = [pa.array([_cell(row, field.name) for row in rows], field.type) for field in _SCHEMA]
+    write_table(path, pa.Table.from_arrays(columns, schema=_SCHEMA), compression="zstd")
 
 
 def read_records(path: Path) -> tuple[EpisodeRecord, ...]:
     """Read what `write_records` wrote.
 
     Raises:
-        IntegrityError: the file is absent, is not such a table, or holds a record that cannot be.
+        IntegrityError: the file is absent, damaged, is not such a table, or holds a record that cannot be.
     """
     try:
-        table = pq.read_table(path, use_threads=False)
-        if not table.schema.equals(_SCHEMA):
-            raise IntegrityError(f"{path} must be a table of episode records, found the columns {table.schema.names}")
-        return tuple(_record(row) for row in table.to_pylist())
-    except (pa.ArrowException, OSError, ValueError) as error:
-        raise IntegrityError(f"{path} must be a table of episode records ({error}); run `wsm index` again") from error
+        must_be, remedy = f"{path} must be a table of episode records", "run `wsm index` again"
+        with opened_table(partial(path.open, "rb"), must_be, remedy) as file:
+            return tuple(_record(row) for row in read_full(file, _SCHEMA).to_pylist())
+    except FileNotFoundError as error:
+        raise IntegrityError(f"{path} is missing; run `wsm index` again") from error
 
 
 def _cell(record: EpisodeRecord, column: str) -> object:

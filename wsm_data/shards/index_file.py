@@ -2,7 +2,7 @@
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from functools import partial
 from itertools import accumulate
 from pathlib import Path
@@ -12,6 +12,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from wsm_data.errors import IntegrityError
+from wsm_data.files.tables import opened_table, require_columns
 from wsm_data.shards.index_row import INDEX_VERSION, SCHEMA
 from wsm_data.shards.row_blocks import RowBlocks
 
@@ -33,19 +34,18 @@ class IndexFile:
 
     def __init__(self, open_file: OpenFile, where: str):
         self._open_file, self._where = open_file, where
+        self._metadata: pq.FileMetaData | None = None
         with self._opened() as file:
-            self._metadata = pq.read_metadata(file)
-            schema = self._metadata.schema.to_arrow_schema()
-            if (schema.metadata or {}).get(b"wsm.index_version") != INDEX_VERSION.encode():
+            if (file.schema_arrow.metadata or {}).get(b"wsm.index_version") != INDEX_VERSION.encode():
                 raise ValueError(f"wsm.index_version must be {INDEX_VERSION}; use a matching wsm")
-            if schema != SCHEMA:
-                raise ValueError(f"its columns must be those of docs/format.md, found {schema.names}")
-        sizes = [self._metadata.row_group(number).num_rows for number in range(self._metadata.num_row_groups)]
+            require_columns(file.schema_arrow, SCHEMA)
+            self._metadata = file.metadata
+            sizes = [file.metadata.row_group(number).num_rows for number in range(file.num_row_groups)]
         self._starts = [0, *accumulate(sizes)]
         self._blocks: dict[tuple[str, ...], RowBlocks] = {}  # a program asks for few choices of columns
 
     def __len__(self) -> int:
-        return int(self._metadata.num_rows)
+        return self._starts[-1]
 
     def columns(self, names: Sequence[str]) -> pa.Table:
         """Some columns, with all their rows; nothing is kept of them here.
@@ -54,7 +54,7 @@ class IndexFile:
             IntegrityError: a page is damaged.
         """
         with self._opened() as file:
-            return self._parquet(file).read(list(names)).select(list(names))
+            return file.read(list(names)).select(list(names))
 
     def parts(self, name: str) -> Iterator[pa.ChunkedArray]:
         """A column group by group. Read at once, each part of a dictionary column would repeat all values before it.
@@ -63,9 +63,8 @@ class IndexFile:
             IntegrityError: a page is damaged.
         """
         with self._opened() as file:
-            parquet = self._parquet(file)
-            for group in range(self._metadata.num_row_groups):
-                yield parquet.read_row_group(group, [name], use_threads=False)[name]
+            for group in range(file.num_row_groups):
+                yield file.read_row_group(group, [name], use_threads=False)[name]
 
     def values(self, names: Sequence[str], rows: np.ndarray) -> list[np.ndarray]:
         """Some columns at some rows, in the order of `rows`; texts as arrays of objects. Rows around them are kept.
@@ -80,20 +79,11 @@ class IndexFile:
     def _read_rows(self, names: tuple[str, ...], start: int, end: int) -> tuple[int, pa.Table]:
         groups = range(bisect_right(self._starts, start) - 1, bisect_left(self._starts, end))
         with self._opened() as file:
-            return self._starts[groups[0]], self._parquet(file).read_row_groups(groups, list(names)).select(list(names))
+            return self._starts[groups[0]], file.read_row_groups(groups, list(names)).select(list(names))
 
-    def _parquet(self, file: pa.NativeFile) -> pq.ParquetFile:
-        return pq.ParquetFile(file, metadata=self._metadata, page_checksum_verification=True)
-
-    @contextmanager
-    def _opened(self) -> Iterator[pa.NativeFile]:
-        try:
-            with self._open_file() as file:
-                yield file
-        except (pa.ArrowException, OSError, ValueError) as error:
-            raise IntegrityError(
-                f"{self._where} must be the index of a release, but: {error}; restore the file"
-            ) from error
+    def _opened(self) -> AbstractContextManager[pq.ParquetFile]:
+        must_be = f"{self._where} must be the index of a release"
+        return opened_table(self._open_file, must_be, "restore the file", self._metadata)
 
 
 @contextmanager

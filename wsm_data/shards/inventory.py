@@ -3,28 +3,23 @@
 import json
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from wsm_data.errors import IntegrityError
-from wsm_data.files.atomic import atomic_file, write_bytes
+from wsm_data.files.atomic import write_bytes
+from wsm_data.files.json_values import from_json, to_json
 from wsm_data.files.jsonlines import canonical_json
+from wsm_data.files.tables import opened_table, read_full, write_table
 from wsm_data.schema.identity import EpisodeId
 
 _TIME_FIELDS = ("time", "seconds")
 _SCHEMA = pa.schema(
-    [
-        ("unit", pa.string()),
-        ("container", pa.string()),
-        ("state", pa.string()),
-        ("split", pa.string()),
-        ("reason", pa.string()),
-        ("source_digest", pa.string()),
-    ]
+    [(name, pa.string()) for name in ("unit", "container", "state", "split", "reason", "source_digest")]
 )
 
 
@@ -72,13 +67,10 @@ class InventoryRow:
 def write_inventory(path: Path, rows: Iterable[InventoryRow]) -> None:
     """Write the inventory atomically, sorted by unit."""
     records = [
-        asdict(row) | {"unit": printable(row.unit), "container": printable(row.container)}
+        to_json(row) | {"unit": printable(row.unit), "container": printable(row.container)}
         for row in sorted(rows, key=lambda row: (row.unit, row.container, row.state, row.reason))
     ]
-    with atomic_file(path) as file:
-        pq.write_table(
-            pa.Table.from_pylist(records, schema=_SCHEMA), file, compression="zstd", write_page_checksum=True
-        )
+    write_table(path, pa.Table.from_pylist(records, schema=_SCHEMA), compression="zstd")
 
 
 def parse_inventory(data: bytes, where: str) -> tuple[InventoryRow, ...]:
@@ -87,13 +79,9 @@ def parse_inventory(data: bytes, where: str) -> tuple[InventoryRow, ...]:
     Raises:
         IntegrityError: it is not an inventory.
     """
-    try:
-        table = pq.read_table(pa.BufferReader(data), page_checksum_verification=True)
-        if table.schema != _SCHEMA:
-            raise ValueError(f"its columns must be {_SCHEMA.names} of text, found {table.schema.names}")
-        return tuple(InventoryRow(**{**row, "state": UnitState(row["state"])}) for row in table.to_pylist())
-    except (pa.ArrowException, OSError, ValueError) as error:
-        raise IntegrityError(f"{where} must be the inventory of a release, but: {error}; restore the file") from error
+    must_be = f"{where} must be the inventory of a release"
+    with opened_table(partial(pa.BufferReader, data), must_be, "restore the file") as file:
+        return tuple(from_json(InventoryRow, row) for row in read_full(file, _SCHEMA).to_pylist())
 
 
 def write_quarantine(path: Path, refusals: Iterable[Mapping[str, object]]) -> None:

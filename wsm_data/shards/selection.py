@@ -3,30 +3,28 @@
 A selection names its release by digest. It changes no shard: a loader that is given one reads the clips it lists.
 """
 
-import json
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
-import pyarrow.parquet as pq
 
 from wsm_data.errors import ConfigError, IntegrityError
-from wsm_data.files.atomic import atomic_file
 from wsm_data.files.digest import digest_json
-from wsm_data.files.jsonlines import canonical_json
 from wsm_data.files.stores import Store, open_store
+from wsm_data.files.tables import opened_table, read_full, read_statement, with_statement, write_table
 from wsm_data.schema.arrays import Float64Array
 from wsm_data.shards.index import IndexTable
 from wsm_data.shards.names import SELECTIONS_FOLDER
 
 SELECTION_SUFFIX = ".parquet"
 SELECTION_VERSION = 1
-_METADATA = b"wsm.selection"
+_STATEMENT = "wsm.selection"
 _SHOWN_CLIPS = 3
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 _SCHEMA = pa.schema([("key", pa.string()), ("rank", pa.int64()), ("score", pa.float64()), ("why", pa.string())])
@@ -132,16 +130,9 @@ def write_selection(path: Path, selection: Selection) -> None:
         "clips": len(selection),
     }
     stated["sha256"] = digest_json(stated)  # parquet has checksums for its pages alone
-    schema = _SCHEMA.with_metadata({_METADATA: canonical_json(stated)})
     columns = [selection.keys, pa.array(selection.ranks), pa.array(selection.scores), selection.why]
-    with atomic_file(path) as file:
-        pq.write_table(
-            pa.Table.from_arrays(columns, schema=schema),
-            file,
-            write_page_checksum=True,
-            compression="zstd",
-            use_dictionary=["why"],
-        )
+    table = pa.Table.from_arrays(columns, schema=with_statement(_SCHEMA, _STATEMENT, stated))
+    write_table(path, table, compression="zstd", use_dictionary=["why"])
 
 
 def read_selection(
@@ -192,23 +183,17 @@ def parse_selection(data: bytes, where: str) -> Selection:
     Raises:
         IntegrityError: the file is damaged, or is no selection of this version.
     """
-    try:
-        table = pq.ParquetFile(pa.BufferReader(data), page_checksum_verification=True).read()
-        stated = json.loads((table.schema.metadata or {}).get(_METADATA, b"null"))
-        return _parse(table, stated)
-    except (pa.ArrowException, OSError, ValueError, KeyError) as error:
-        raise IntegrityError(f"{where} must be a selection, but: {error}; restore it or select again") from error
+    must_be, remedy = f"{where} must be a selection", "restore it or select again"
+    with opened_table(partial(pa.BufferReader, data), must_be, remedy) as file:
+        stated = read_statement(file.schema_arrow, _STATEMENT, SELECTION_VERSION)
+        return _parse(read_full(file, _SCHEMA), stated)
 
 
-def _parse(table: pa.Table, stated: Any) -> Selection:
-    if not isinstance(stated, dict):
-        raise ValueError(f"its metadata has no {_METADATA.decode()}")
-    if stated["version"] != SELECTION_VERSION:
-        raise ValueError(f"version must be {SELECTION_VERSION}, found {stated['version']!r}; use a matching wsm")
+def _parse(table: pa.Table, stated: Mapping[str, Any]) -> Selection:
     if digest_json({key: value for key, value in stated.items() if key != "sha256"}) != stated["sha256"]:
         raise ValueError("its metadata was changed since it was written")
-    if not table.schema.equals(_SCHEMA) or table.num_rows != stated["clips"]:
-        raise ValueError(f"it must have {stated['clips']} rows of {_SCHEMA.names}, found {table.num_rows}")
+    if table.num_rows != stated["clips"]:
+        raise ValueError(f"it must have {stated['clips']} rows, found {table.num_rows}")
     selection = Selection(
         name=stated["name"],
         release_digest=stated["release_digest"],

@@ -176,7 +176,7 @@ def test_damage_is_told_from_a_wrong_request(file, tmp_path):
             read_scores(file, release_digest="d1")
     other = tmp_path / "other.parquet"
     pq.write_table(pa.table({"key": ["a"]}), other)
-    with pytest.raises(IntegrityError, match="its version must be 2, found None"):
+    with pytest.raises(IntegrityError, match="must say version 2, found None"):
         read_scores(other, release_digest="d1")
 
 
