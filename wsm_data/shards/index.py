@@ -12,6 +12,7 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from wsm_data.errors import ConfigError
+from wsm_data.files.arrow_arrays import arrow_numbers, arrow_texts, numpy_of
 from wsm_data.files.atomic import atomic_file
 from wsm_data.shards.index_file import IndexFile
 from wsm_data.shards.index_row import (
@@ -86,7 +87,7 @@ class IndexTable:
 
     def numbers(self, column: str) -> np.ndarray:
         """An integer column as an array [rows]."""
-        return np.asarray(self.columns([column])[column].to_numpy())
+        return numpy_of(self.columns([column])[column])
 
     def parts(self, column: str) -> Iterator[pa.ChunkedArray]:
         """A column part by part, the same rows in the same part of every column; nothing is kept."""
@@ -99,7 +100,7 @@ class IndexTable:
         for chunk in (chunk for part in self.parts(column) for chunk in part.chunks if len(chunk)):
             values = chunk.dictionary.to_pylist()
             renumbered = np.array([numbers.setdefault(value, len(numbers)) for value in values], np.int32)
-            codes.append(renumbered[chunk.indices.to_numpy()])
+            codes.append(renumbered[numpy_of(chunk.indices)])
         return np.concatenate(codes), tuple(numbers)
 
     def counts(self, column: str) -> dict[str, int]:
@@ -120,16 +121,11 @@ class IndexTable:
         if isinstance(self.content, IndexFile) and len(wanted):
             return self.content.values(names, wanted)
         table = self.content if isinstance(self.content, pa.Table) else SCHEMA.empty_table()
-        return [column.to_numpy() for column in table.select(names).take(pa.array(wanted)).columns]
+        return [numpy_of(column) for column in table.select(names).take(arrow_numbers(wanted)).columns]
 
     def rows_of(self, keys: Sequence[str] | pa.StringArray) -> np.ndarray:
         """Rows of the clips with these keys, no key twice, -1 where there is no such clip; int64 [keys]."""
-        wanted = keys if isinstance(keys, pa.Array) else pa.array(keys, pa.string())
-        numbers = pc.index_in(self.columns(["key"])["key"], value_set=wanted).combine_chunks()
-        found = numbers.is_valid().to_numpy(zero_copy_only=False)
-        rows = np.full(len(wanted), -1, np.int64)
-        rows[numbers.drop_null().to_numpy()] = np.flatnonzero(found)
-        return rows
+        return _places(self.columns(["key"])["key"], keys if isinstance(keys, pa.Array) else arrow_texts(keys))
 
     def row_at(self, number: int) -> IndexRow:
         """The clip in row `number`.
@@ -148,7 +144,7 @@ class IndexTable:
             ConfigError: there is no such clip.
             IntegrityError: the row contradicts itself.
         """
-        place = pc.index(self._keys, key).as_py()
+        place = int(_places(self._keys, arrow_texts([key]))[0])
         if place < 0:
             raise ConfigError(f"the release has no clip {key!r}; `wsm inspect RELEASE` lists what it has")
         return self.row_at(place)
@@ -177,6 +173,14 @@ class IndexTable:
     @cached_property
     def _shards(self) -> tuple[np.ndarray, tuple[str, ...]]:
         return self.codes("shard")
+
+
+def _places(column: pa.ChunkedArray, wanted: pa.StringArray) -> np.ndarray:
+    """Where each text stands in a column, -1 where it does not; int64 [wanted]."""
+    numbers = pc.index_in(column, value_set=wanted).combine_chunks()
+    rows = np.full(len(wanted), -1, np.int64)
+    rows[numpy_of(numbers.drop_null())] = np.flatnonzero(numpy_of(numbers.is_valid()))
+    return rows
 
 
 def parse_index(data: bytes, where: str) -> IndexTable:

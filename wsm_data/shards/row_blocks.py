@@ -11,6 +11,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pyarrow as pa
 
+from wsm_data.files.arrow_arrays import numpy_of
+
 _BLOCK_ROWS = 512  # about two shards
 _KEPT_VALUES = 1 << 22
 """32 MB of numbers: for the 17 columns that a loader reads, a quarter of a million rows. With half of it, not all
@@ -75,4 +77,4 @@ class RowBlocks:
 
 def _arrays(table: pa.Table) -> Block:
     """Columns as arrays that own their memory: a view would keep everything that was read with them."""
-    return tuple(np.array(column.to_numpy()) for column in table.columns)
+    return tuple(np.array(numpy_of(column)) for column in table.columns)

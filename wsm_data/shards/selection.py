@@ -15,6 +15,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from wsm_data.errors import ConfigError, IntegrityError
+from wsm_data.files.arrow_arrays import arrow_numbers, arrow_texts, numpy_of
 from wsm_data.files.digest import digest_json
 from wsm_data.files.stores import Store, open_store
 from wsm_data.files.tables import opened_table, read_full, read_statement, with_statement, write_table
@@ -130,7 +131,7 @@ def write_selection(path: Path, selection: Selection) -> None:
         "clips": len(selection),
     }
     stated["sha256"] = digest_json(stated)  # parquet has checksums for its pages alone
-    columns = [selection.keys, pa.array(selection.ranks), pa.array(selection.scores), selection.why]
+    columns = [selection.keys, arrow_numbers(selection.ranks), arrow_numbers(selection.scores), selection.why]
     table = pa.Table.from_arrays(columns, schema=with_statement(_SCHEMA, _STATEMENT, stated))
     write_table(path, table, compression="zstd", use_dictionary=["why"])
 
@@ -200,16 +201,16 @@ def _parse(table: pa.Table, stated: Mapping[str, Any]) -> Selection:
         rule=stated["rule"],
         command=stated["command"],
         keys=_whole(table["key"]),
-        scores=table["score"].to_numpy(),
+        scores=numpy_of(table["score"]),
         why=_whole(table["why"]),
     )
-    if not np.array_equal(table["rank"].to_numpy(), selection.ranks):
+    if not np.array_equal(numpy_of(table["rank"]), selection.ranks):
         raise ValueError("ranks must count from 1")
     return selection
 
 
 def _whole(column: pa.ChunkedArray) -> pa.StringArray:
-    return pa.concat_arrays(column.chunks) if column.num_chunks else pa.array([], pa.string())
+    return pa.concat_arrays(column.chunks) if column.num_chunks else arrow_texts([])
 
 
 def selection_file(release: Store, name: str) -> tuple[str, bytes]:
