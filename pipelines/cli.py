@@ -1,8 +1,10 @@
 """`wsm`: the commands of `pipelines.commands`, and what becomes of their errors."""
 
-import errno
 import logging
 import sys
+from collections.abc import Callable
+from functools import wraps
+from pathlib import Path
 from typing import Any, NoReturn
 
 import typer
@@ -11,6 +13,8 @@ from typer.core import TyperGroup
 from pipelines.commands import audit, audit_run, bench, inspect, run, stages, train
 from pipelines.commands.command import Command, CommandGroup
 from wsm_data.errors import WsmError
+from wsm_data.files.atomic import is_full_disk
+from wsm_data.files.locations import require_local
 
 COMMANDS: tuple[Command | CommandGroup, ...] = (
     *stages.COMMANDS,
@@ -39,7 +43,7 @@ class _Commands(TyperGroup):
         except KeyboardInterrupt:
             _fail("interrupted; run the same command again to go on where it stopped", _INTERRUPTED_EXIT_CODE)
         except OSError as error:
-            if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+            if not is_full_disk(error):
                 raise
             _fail(f"the disk is full ({error}); free space and run the same command again", 1)
 
@@ -49,9 +53,22 @@ def _fail(message: str, code: int) -> NoReturn:
     sys.exit(code)
 
 
+def _with_local_paths(call: Callable[..., None]) -> Callable[..., None]:
+    """The same command, which refuses a URL wherever it takes a path, before any work."""
+
+    @wraps(call)
+    def checked(**values: object) -> None:
+        for name, value in values.items():
+            if isinstance(value, Path):
+                require_local(f"--{name.replace('_', '-')}", value)
+        call(**values)
+
+    return checked
+
+
 def _add(to: typer.Typer, command: Command | CommandGroup) -> None:
     if isinstance(command, Command):
-        to.command(command.name, help=command.summary, epilog=command.epilog)(command.call)
+        to.command(command.name, help=command.summary, epilog=command.epilog)(_with_local_paths(command.call))
         return
     group = typer.Typer(help=command.summary, no_args_is_help=True)
     for one in command.commands:

@@ -2,12 +2,14 @@
 
 import logging
 from pathlib import Path
+from tempfile import TemporaryFile
 
 import fsspec
 import xxhash
 
 from wsm_data.errors import ConfigError
-from wsm_data.files.atomic import write_bytes
+from wsm_data.files.atomic import is_full_disk, write_bytes
+from wsm_data.files.locations import is_url
 
 _LOG = logging.getLogger(__name__)
 _READ_BYTES = 4 << 20
@@ -33,24 +35,46 @@ def content_digest(location: str, missing: str) -> str:
     return str(digest.hexdigest())
 
 
-def copy_into_release(path: Path, release: str, name: str, otherwise: str) -> Path | None:
-    """Copy a file into a local release, and return the copy; where that cannot be, warn and return None.
+def why_not_writable(release: str, name: str) -> str:
+    """Why no file of this name can be written into a release; empty where it can. A nameless one is, and is gone."""
+    if is_url(release):
+        return "it lies behind a URL"
+    folder = next(parent for parent in (Path(release) / name).parents if parent.is_dir())
+    try:
+        with TemporaryFile(dir=folder):
+            return ""
+    except OSError as error:
+        if is_full_disk(error):
+            raise
+        return str(error)
+
+
+def copy_into_release(path: Path, release: str, name: str) -> Path | None:
+    """Copy a file into a release, and return the copy; None where nothing can be written (`why_not_writable`).
 
     Args:
         path: the file.
-        release: folder or URL of the release; nothing is written behind a URL.
+        release: folder or URL of the release.
         name: name of the copy in the release.
-        otherwise: how the file is found where it is.
     """
-    if "://" in release:
-        _LOG.warning("%s is not copied to %s: put it there as %s", path, release, name)
+    if is_url(release):
         return None
     copy, data = Path(release) / name, path.read_bytes()
     if copy.is_file() and copy.read_bytes() == data:
         return copy
-    try:
-        write_bytes(copy, data)
-    except PermissionError as error:
-        _LOG.warning("%s cannot be copied into its release (%s); %s", path, error, otherwise)
+    if why_not_writable(release, name):
         return None
+    write_bytes(copy, data)
     return copy
+
+
+def warn_if_not_writable(release: str, name: str, otherwise: str) -> None:
+    """Say before the work that its result will stay where it is written, and how it is found there.
+
+    Args:
+        release: folder or URL of the release.
+        name: name of the copy in the release.
+        otherwise: how others are told of it.
+    """
+    if why := why_not_writable(release, name):
+        _LOG.warning("%s will not be copied into %s (%s): %s", name, release, why, otherwise)

@@ -5,12 +5,14 @@ from pathlib import Path
 import typer
 
 from pipelines.artifacts.layout import release_folder
+from pipelines.artifacts.release_files import warn_if_not_writable
 from pipelines.operations import materialise as copying
 from pipelines.operations.run_stage import run_built, stage_settings
 from pipelines.running.options import StageRequest
 from pipelines.stages import select, verify
 from wsm_data.access.release import open_release
 from wsm_data.shards.release_codec import codec_of
+from wsm_data.shards.selection import selection_path
 from wsm_data.view.selection.report import write_selection_report
 
 
@@ -29,6 +31,7 @@ def run_select(release: str, request: StageRequest, *, report: bool, materialise
         IntegrityError: a clip that is shown or copied is damaged.
     """
     settings = stage_settings(select.STAGE, request, release)
+    warn_if_not_writable(release, selection_path(settings.name), "name the selection to loaders by its path")
     folder = run_built(select.STAGE, settings, request.out or Path("select") / settings.name, request)
     if request.options.dry_run:
         return

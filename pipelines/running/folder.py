@@ -4,7 +4,6 @@ The ledger is a journal (`wsm_data.files.journal`): a run writes a file of its o
 again once the stage has come to its end.
 """
 
-import errno
 import fcntl
 import json
 import time
@@ -16,7 +15,7 @@ from typing import Any, TextIO
 
 from pipelines.running.stage import Outcome
 from wsm_data.errors import ConfigError, IntegrityError, Reason
-from wsm_data.files.atomic import write_text
+from wsm_data.files.atomic import is_full_disk, write_text
 from wsm_data.files.journal import JournalWriter, journal_files, read_journal, rewrite_journal
 from wsm_data.files.jsonlines import canonical_json, read_lines, write_lines
 from wsm_data.schema.verdict import Refusal
@@ -235,7 +234,7 @@ def _lock_file(folder: Path) -> TextIO:
         folder.mkdir(parents=True, exist_ok=True)
         return (folder / ".lock").open("w")
     except OSError as error:
-        if error.errno in (errno.ENOSPC, errno.EDQUOT):  # no fault of the request
+        if is_full_disk(error):  # no fault of the request
             raise
         raise ConfigError(f"{folder} must be a folder that can be written ({error}); use another --out") from error
 

@@ -1,6 +1,5 @@
 """Runs one stage: finds what is pending, has an engine do it, writes the ledger, keeps to the budget, finishes."""
 
-import errno
 import fnmatch
 import time
 from collections import Counter
@@ -38,7 +37,7 @@ from pipelines.running.stage import REFUSED, ConfigT, Finished, Outcome, Settled
 from pipelines.running.stage_report import StageReport, stage_report
 from pipelines.running.upstream import pending_units, quarantine_of, upstream_records
 from wsm_data.errors import BudgetExceeded, ConfigError, DataError, WsmError
-from wsm_data.files.atomic import remove_temporaries
+from wsm_data.files.atomic import is_full_disk, remove_temporaries
 from wsm_data.files.digest import digest_json
 from wsm_data.files.jsonlines import write_lines
 from wsm_data.schema.verdict import Refusal
@@ -271,7 +270,7 @@ def _full_disk_named(folder: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+        if not is_full_disk(error):
             raise
         raise WsmError(
             f"the disk of {folder} is full ({error}); free space and run the same command again: what is done is kept"

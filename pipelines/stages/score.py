@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 
-from pipelines.artifacts.release_files import content_digest, copy_into_release
+from pipelines.artifacts.release_files import content_digest, copy_into_release, warn_if_not_writable
 from pipelines.running.stage import Finished, Outcome, Settled, Stage, StageContext, Unit
 from wsm_data.access.release import Release, open_release, read_manifest
 from wsm_data.codecs.base import VideoCodec
@@ -37,7 +37,8 @@ class ScoreConfig:
         rollouts: path or URL of a table of rollouts on this release, for the scores of models; empty for none.
         depth_samples: latents of a clip whose depth is decoded, for the share of saturated depth; 0: none is. Depth of
             a codec other than `dct` is not decoded.
-        install: whether the scores are copied into the release, where `wsm select` looks for them; not behind a URL.
+        install: whether the scores are copied into the release, where `wsm select` looks for them; where nothing can be
+            written there, they stay in the folder of the stage alone, which is said before the work.
     """
 
     release: str = field(metadata=INPUT)
@@ -52,6 +53,8 @@ class ScoreConfig:
 
 def _list_units(config: ScoreConfig) -> Sequence[Unit]:
     """One unit a shard: its clips, and all that the scores of a clip depend on beside it."""
+    if config.install:
+        warn_if_not_writable(config.release, SCORES_NAME, "name the scores to `wsm select` with --set scores=PATH")
     manifest = read_manifest(open_store(config.release))
     shared = {
         "codec": manifest.codec.digest,
@@ -146,7 +149,7 @@ def _installed(path: Path, config: ScoreConfig, out: Path) -> tuple[str, ...]:
     """Copy the scores into a local release; returns the name of the copy, relative to the folder of the stage."""
     if not config.install:
         return ()
-    copy = copy_into_release(path, config.release, SCORES_NAME, "name it with --set scores=PATH")
+    copy = copy_into_release(path, config.release, SCORES_NAME)
     return (os.path.relpath(copy, out),) if copy else ()
 
 

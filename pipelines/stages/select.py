@@ -99,14 +99,14 @@ def _needed_scores(release: Release, config: SelectConfig, keys: pa.ChunkedArray
 
 
 def install_selection(path: Path, config: SelectConfig) -> None:
-    """Put the selection into its release, where loaders find it by its name; nothing is done behind a URL.
+    """Put the selection into its release, where loaders find it by its name; nothing is done where that is read-only.
 
     Where one of other settings stands there under its name, it is replaced, and that is announced.
     """
     name = selection_path(config.name)
     installed = Path(config.release) / name
     old = installed.read_bytes() if installed.is_file() else b""  # behind a URL there is none
-    if copy_into_release(path, config.release, name, "name it by its path") and old:
+    if copy_into_release(path, config.release, name) and old:
         _announce_replacement(installed, old, path.read_bytes())
 
 

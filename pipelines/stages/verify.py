@@ -11,6 +11,7 @@ from wsm_data.access.release import read_manifest
 from wsm_data.access.verify import verify_release
 from wsm_data.errors import IntegrityError
 from wsm_data.files.digest import digest_json, sha256_bytes
+from wsm_data.files.locations import is_url
 from wsm_data.files.stores import open_store
 from wsm_data.files.typed_toml import INPUT
 from wsm_data.shards.findings import Finding
@@ -49,7 +50,7 @@ def _list_units(config: VerifyConfig) -> Sequence[Unit]:
     store = open_store(config.release)
     manifest = read_manifest(store)
     inputs = {"manifest": sha256_bytes(store.read(MANIFEST_NAME))}
-    if "://" not in config.release:  # a local file that is touched is read again; a remote one is known by its size
+    if not is_url(config.release):  # a local file that is touched is read again; a remote one is known by its size
         files = sorted(path for path in Path(config.release).iterdir() if _is_read(path.name))
         inputs["files"] = digest_json([[one.name, one.stat().st_size, one.stat().st_mtime_ns] for one in files])
     return [Unit(id=manifest.name, inputs=inputs)]

@@ -1,5 +1,6 @@
 """Files that exist whole or not at all: written under a temporary name, flushed to disk, then renamed."""
 
+import errno
 import os
 import secrets
 from collections.abc import Iterator
@@ -29,6 +30,11 @@ def atomic_file(path: Path) -> Iterator[BinaryIO]:
         flush_folder(path.parent)
     finally:
         temporary.unlink(missing_ok=True)  # there is none once it has been renamed
+
+
+def is_full_disk(error: OSError) -> bool:
+    """Whether the system refused to write because there is no room, or no more of what this user may take."""
+    return error.errno in (errno.ENOSPC, errno.EDQUOT)
 
 
 def write_bytes(path: Path, data: bytes) -> None:

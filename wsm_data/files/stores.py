@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Protocol
 
 from wsm_data.files.fsspec_store import FsspecStore
+from wsm_data.files.locations import is_url
 
 
 class Store(Protocol):
@@ -60,11 +61,6 @@ class LocalStore:
         with (Path(self.root) / name).open("rb") as file:
             file.seek(offset)
             return file.read(size)
-
-
-def is_url(location: str | Path) -> bool:
-    """Whether a location is an fsspec URL (anything with `://`), and no local path."""
-    return "://" in str(location)
 
 
 def open_store(location: str | Path) -> Store:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from wsm_data.errors import ConfigError
+from wsm_data.files.locations import require_local
 
 ConfigT = TypeVar("ConfigT")
 
@@ -112,7 +113,8 @@ def convert(hint: Any, value: Any, name: str) -> Any:
     if isinstance(value, Word):
         value = _meaning(hint, value)
     if hint is Path:
-        return Path(_require(value, str, name)).expanduser()
+        require_local(name, _require(value, str, name))
+        return Path(value).expanduser()
     if isinstance(hint, type) and issubclass(hint, Enum):
         return _convert_enum(hint, value, name)
     if hint is float and isinstance(value, int) and not isinstance(value, bool):

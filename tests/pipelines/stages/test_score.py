@@ -176,7 +176,10 @@ def test_behind_a_url_the_same_bytes_are_written_and_nothing_is_installed(score,
         assert not fsspec.filesystem("memory").exists(f"{remote}/scores.parquet")
     finally:
         fsspec.filesystem("memory").rm(remote, recursive=True)
-    assert "is not copied to memory://scored: put it there as scores.parquet" in caplog.text
+    assert (
+        "scores.parquet will not be copied into memory://scored (it lies behind a URL): name the scores to"
+        in caplog.text
+    )
     assert path.read_bytes() == score()[1].read_bytes()
 
 

@@ -14,7 +14,6 @@ from fsspec.implementations.memory import MemoryFileSystem
 from wsm_data.errors import ConfigError, StoreError
 from wsm_data.files.fsspec_store import FsspecStore
 from wsm_data.files.retries import RequestConfig
-from wsm_data.files.stores import is_url
 
 DATA = bytes(range(256)) * 4
 FAST = RequestConfig(attempts=3, first_backoff_s=0.0, timeout_s=0.2)
@@ -207,7 +206,3 @@ def test_what_is_listed_is_what_is_there_now():
         assert store.names() == ["a", "b"]
     finally:
         filesystem.rm("/listing-test", recursive=True)
-
-
-def test_urls_and_paths_are_told_apart():
-    assert [is_url(text) for text in ("s3://bucket/x", "file:///x", "/x", "x/y")] == [True, True, False, False]
