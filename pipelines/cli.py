@@ -12,6 +12,12 @@ from typer.core import TyperGroup
 
 from pipelines.commands import audit, audit_run, bench, inspect, run, stages, train
 from pipelines.commands.command import Command, CommandGroup
+from pipelines.running.interrupts import (
+    INTERRUPTED_EXIT_CODE,
+    TERMINATED_EXIT_CODE,
+    Terminated,
+    arriving_interrupts,
+)
 from wsm_data.errors import WsmError
 from wsm_data.files.atomic import is_full_disk
 from wsm_data.files.locations import require_local
@@ -28,8 +34,6 @@ COMMANDS: tuple[Command | CommandGroup, ...] = (
 )
 """In the order of `wsm --help`."""
 
-_INTERRUPTED_EXIT_CODE = 130
-
 
 class _Commands(TyperGroup):
     """Turns foreseen errors into one message and their exit code; anything else keeps its traceback."""
@@ -37,11 +41,14 @@ class _Commands(TyperGroup):
     def invoke(self, ctx: Any) -> object:
         logging.basicConfig(format="%(levelname)s %(message)s", level=logging.WARNING)
         try:
-            return super().invoke(ctx)
+            with arriving_interrupts():
+                return super().invoke(ctx)
         except WsmError as error:
             _fail(str(error), error.exit_code)
+        except Terminated:
+            _fail("terminated; run the same command again to go on where it stopped", TERMINATED_EXIT_CODE)
         except KeyboardInterrupt:
-            _fail("interrupted; run the same command again to go on where it stopped", _INTERRUPTED_EXIT_CODE)
+            _fail("interrupted; run the same command again to go on where it stopped", INTERRUPTED_EXIT_CODE)
         except OSError as error:
             if not is_full_disk(error):
                 raise

@@ -101,6 +101,12 @@ class StoreError(WsmError):
     exit_code = 5
 
 
+class Preempted(WsmError):
+    """The system asked the program to end (SIGTERM): what was done is saved, and the same command goes on."""
+
+    exit_code = 143  # as of a program that SIGTERM ends: a scheduler requeues it
+
+
 class NumericalError(WsmError):
     """A value that must be finite is not: training stops, and what was saved before stays as it is."""
 

@@ -63,6 +63,14 @@ def sum_over_ranks(values: Iterable[float], device: torch.device) -> list[float]
     return [float(value) for value in total.tolist()]
 
 
+def any_rank(here: bool) -> bool:
+    """Whether something holds on any rank; every rank gets the same answer."""
+    if not dist.is_initialized():
+        return here
+    device = torch.device("cuda", torch.cuda.current_device()) if dist.get_backend() == "nccl" else torch.device("cpu")
+    return sum_over_ranks([float(here)], device)[0] > 0
+
+
 def whole(tensor: Tensor) -> Tensor:
     """A tensor with the parts of all ranks."""
     full = getattr(tensor, "full_tensor", None)

@@ -4,7 +4,7 @@ import fnmatch
 import time
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -31,13 +31,14 @@ from pipelines.running.folder import (
     write_quarantine,
     write_stage_record,
 )
+from pipelines.running.full_disk import full_disk_named
 from pipelines.running.options import RunOptions
 from pipelines.running.settings import config_json, settings_of
 from pipelines.running.stage import REFUSED, ConfigT, Finished, Outcome, Settled, Stage, StageContext, Unit, refused
 from pipelines.running.stage_report import StageReport, stage_report
 from pipelines.running.upstream import pending_units, quarantine_of, upstream_records
 from wsm_data.errors import BudgetExceeded, ConfigError, DataError, WsmError
-from wsm_data.files.atomic import is_full_disk, remove_temporaries
+from wsm_data.files.atomic import remove_temporaries
 from wsm_data.files.digest import digest_json
 from wsm_data.files.jsonlines import write_lines
 from wsm_data.schema.verdict import Refusal
@@ -113,7 +114,7 @@ def run_stage(
     if options.dry_run:
         job.ledger.update(_standing(out))
         return _report(job, _selected(job), 0.0)
-    with _full_disk_named(out), locked(out):
+    with full_disk_named(out), locked(out):
         remove_temporaries(out)
         job.ledger.update(_standing(out))
         selected = _selected(job)
@@ -250,7 +251,7 @@ def _process_batch(
     left = {unit.id: unit for unit in batch}
     started = time.perf_counter()
     try:
-        with _full_disk_named(context.out):
+        with full_disk_named(context.out):
             for outcome in stage.process(batch, config, context):
                 if left.pop(outcome.unit, None) is None:
                     raise RuntimeError(f"{stage.name} gave an outcome too many, for {outcome.unit}")
@@ -262,19 +263,6 @@ def _process_batch(
         return
     if left:
         raise RuntimeError(f"{stage.name} gave no outcome for {', '.join(left)}")
-
-
-@contextmanager
-def _full_disk_named(folder: Path) -> Iterator[None]:
-    """Turn a write that found no room, wherever it was, into an error for a person."""
-    try:
-        yield
-    except OSError as error:
-        if not is_full_disk(error):
-            raise
-        raise WsmError(
-            f"the disk of {folder} is full ({error}); free space and run the same command again: what is done is kept"
-        ) from error
 
 
 def _is_finished(job: _Job[ConfigT]) -> bool:

@@ -13,8 +13,8 @@ RUN/evaluation.json     errors on held-out clips, at the end
 
 import dataclasses
 import json
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, nullcontext
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,9 @@ from typing import Any
 import torch
 from tqdm import tqdm
 
+from pipelines.running.folder import locked
+from pipelines.running.full_disk import full_disk_named
+from pipelines.running.interrupts import termination_noted
 from pipelines.training.config import TrainRunConfig
 from pipelines.training.data import held_out_loader, model_config, training_loader
 from pipelines.training.evaluation import evaluate
@@ -59,13 +62,17 @@ def run_training(config: TrainRunConfig, out: Path, *, quiet: bool) -> str | Non
         The table of errors on held-out clips, empty where there are none, on the first rank; None elsewhere.
 
     Raises:
-        ConfigError: the settings do not fit the releases, or the folder belongs to another run.
+        ConfigError: the settings do not fit the releases, the folder belongs to another run, or another process trains
+            in it.
         IntegrityError: a release or a checkpoint is damaged.
         NumericalError: a loss is not finite.
+        Preempted: SIGTERM came; a checkpoint holds the step that was being worked on.
     """
     device = start_ranks()
+    rank, _ = rank_and_world_size()
     try:
-        return _run(config, out, device, quiet)
+        with full_disk_named(out), nullcontext() if rank else locked(out):
+            return _run(config, out, device, quiet)
     finally:
         leave_ranks()
 
@@ -102,9 +109,11 @@ def _run(config: TrainRunConfig, out: Path, device: torch.device, quiet: bool) -
         )
         done = resume(run, loader)
         if rank == 0:  # only now is it certain that the folder is this run's
-            out.mkdir(parents=True, exist_ok=True)
             write_text(out / "run.json", json.dumps(dataclasses.asdict(config), indent=1, sort_keys=True) + "\n")
-        with _hooks(config, out, model, done, total_steps(config.training, loader), device, quiet) as hooks:
+        with (
+            termination_noted() as must_stop,
+            _hooks(config, out, model, done, total_steps(config.training, loader), device, quiet, must_stop) as hooks,
+        ):
             model.checkpoint_activations = config.training.checkpoint_activations
             model.train()
             step = partial(pretraining_step, model, run, config.training)
@@ -134,13 +143,22 @@ def _fill_with_wan(config: TrainRunConfig, out: Path, model: WorldSlamModel) -> 
 
 @contextmanager
 def _hooks(
-    config: TrainRunConfig, out: Path, model: WorldSlamModel, done: int, steps: int, device: torch.device, quiet: bool
+    config: TrainRunConfig,
+    out: Path,
+    model: WorldSlamModel,
+    done: int,
+    steps: int,
+    device: torch.device,
+    quiet: bool,
+    must_stop: Callable[[], bool],
 ) -> Iterator[Hooks]:
     """Metrics, pictures and the progress bar, of the first rank; the others only take part in the pictures."""
     rank, _ = rank_and_world_size()
     sample = _sampler(config, out, model, device)
     if rank:
-        yield Hooks(metrics=lambda _step, _values: None, sample=sample, progress=lambda _done: None)
+        yield Hooks(
+            metrics=lambda _step, _values: None, sample=sample, progress=lambda _done: None, must_stop=must_stop
+        )
         return
     with (
         metrics_writer(out, done) as write,
@@ -151,7 +169,10 @@ def _hooks(
             write(step, values)
             bar.set_postfix(loss=f"{values['loss']:.4f}", refresh=False)
 
-        yield Hooks(metrics=show, sample=sample, progress=lambda now: bar.update(now - bar.n) and None)
+        def progress(now: int) -> None:
+            bar.update(now - bar.n)
+
+        yield Hooks(metrics=show, sample=sample, progress=progress, must_stop=must_stop)
 
 
 def _sampler(config: TrainRunConfig, out: Path, model: WorldSlamModel, device: torch.device) -> Any:

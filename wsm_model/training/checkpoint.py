@@ -54,6 +54,10 @@ def save_checkpoint(folder: Path, model: nn.Module, optimiser: torch.optim.Optim
 
     Returns:
         The folder of this step.
+
+    Raises:
+        OSError: it could not be written; the folder is no checkpoint then.
+        KeyboardInterrupt: likewise.
     """
     rank, world_size = rank_and_world_size()
     path = folder / f"step-{state.step:06d}"
@@ -62,7 +66,7 @@ def save_checkpoint(folder: Path, model: nn.Module, optimiser: torch.optim.Optim
         path.mkdir(parents=True)
     wait_for_all()
     writer = HuggingFaceStorageWriter(str(path), save_distributed=True)
-    with _quiet_alone():
+    with _quiet_alone(), _causes_raised():
         save(_tensors(model, optimiser), storage_writer=writer, no_dist=world_size == 1)
     wait_for_all()
     own = {file.name: xxh3_128_file(file) for file in sorted(path.glob("*.safetensors"))[rank::world_size]}
@@ -144,6 +148,19 @@ def _quiet_alone() -> Iterator[None]:
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="torch.distributed is disabled", category=UserWarning)
         yield
+
+
+@contextmanager
+def _causes_raised() -> Iterator[None]:
+    """Raise what ended a rank, which torch wraps: Ctrl-C, or what the system said, such as no room."""
+    try:
+        yield
+    except CheckpointException as error:
+        causes = [cause for cause, _ in error.failures.values()]
+        for kind in (KeyboardInterrupt, OSError):
+            if found := next((cause for cause in causes if isinstance(cause, kind)), None):
+                raise found from None
+        raise
 
 
 def _cause(error: BaseException) -> str:

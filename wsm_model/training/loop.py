@@ -11,8 +11,8 @@ import torch
 from torch import nn
 from torch.nn.utils import clip_grad_norm_
 
-from wsm_data.errors import NumericalError
-from wsm_model.ranks import rank_and_world_size, whole
+from wsm_data.errors import NumericalError, Preempted
+from wsm_model.ranks import any_rank, rank_and_world_size, whole
 from wsm_model.training.checkpoint import (
     TrainingState,
     checkpoints,
@@ -65,11 +65,13 @@ class Hooks:
         metrics: takes the numbers of a step; called on the first rank.
         sample: draws pictures after a step; called on every rank.
         progress: takes the number of steps done, on the first rank.
+        must_stop: asked after every step whether to save and end now; on every rank, and one is enough.
     """
 
     metrics: MetricsWriter
     sample: Callable[[int], None]
     progress: Callable[[int], None]
+    must_stop: Callable[[], bool]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,6 +132,7 @@ def train(
 
     Raises:
         NumericalError: of `step`; no checkpoint is written then.
+        Preempted: it had to stop before the schedule ended, and a checkpoint says where.
     """
     steps = total_steps(config, loader)
     rank, _ = rank_and_world_size()
@@ -149,8 +152,9 @@ def train(
                     hooks.metrics(done, {**result.losses, **extra})
             if config.sample_every and done % config.sample_every == 0:
                 hooks.sample(done)
-            if done % config.checkpoint_every == 0 or is_last:
-                save_checkpoint(
+            stops = any_rank(hooks.must_stop())
+            if done % config.checkpoint_every == 0 or is_last or stops:
+                path = save_checkpoint(
                     run.folder,
                     run.model,
                     run.optimiser,
@@ -160,6 +164,8 @@ def train(
                     drop_old_checkpoints(run.folder, config.keep_checkpoints)
             if is_last:
                 break
+            if stops:
+                raise Preempted(f"told to end (SIGTERM): {path} holds step {done}; run the same command again to go on")
 
 
 def finish_step(

@@ -102,7 +102,7 @@ def run(make_model, make_loader):
             if step == kill_after:
                 raise Stop
 
-        hooks = Hooks(metrics=metrics, sample=lambda _step: None, progress=lambda _done: None)
+        hooks = Hooks(metrics=metrics, sample=lambda _step: None, progress=lambda _done: None, must_stop=lambda: False)
         with suppress(Stop):
             train(own, partial(pretraining_step, model, own, config), loader, config, hooks=hooks, done=done)
         return model, lines

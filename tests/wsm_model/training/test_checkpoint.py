@@ -1,5 +1,6 @@
 """Checkpoints: what comes back, what is passed over, what is refused."""
 
+import errno
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -9,6 +10,7 @@ import pytest
 import torch
 from safetensors import safe_open
 from safetensors.torch import load_file, save_file
+from torch.distributed.checkpoint.hf_storage import HuggingFaceStorageWriter
 
 from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.files.digest import xxh3_128_file
@@ -219,3 +221,18 @@ def test_all_but_the_latest_are_dropped_in_the_order_of_steps(make_run, tmp_path
     drop_old_checkpoints(tmp_path, 2)
     assert [path.name for path in checkpoints(tmp_path)] == ["step-999999", "step-1000000"]
     assert sorted(path.name for path in tmp_path.iterdir()) == ["step-1000000", "step-999999"]
+
+
+@pytest.mark.parametrize("cause", [KeyboardInterrupt(), OSError(errno.ENOSPC, "No space left on device")])
+def test_what_ends_the_writing_is_raised_as_it_is_and_leaves_no_checkpoint(make_run, tmp_path, monkeypatch, cause):
+    """torch wraps whatever happens on a rank, Ctrl-C included, in an exception with a traceback of its own."""
+
+    def end(*_):
+        raise cause
+
+    monkeypatch.setattr(HuggingFaceStorageWriter, "write_data", end)
+    run = make_run(1)
+    with pytest.raises(type(cause)) as raised:
+        save_checkpoint(tmp_path, run.model, run.optimiser, state_of(1))
+    assert raised.value is cause
+    assert checkpoints(tmp_path) == []

@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from wsm_data.errors import NumericalError
+from wsm_data.errors import NumericalError, Preempted
 from wsm_model.training.checkpoint import checkpoints
 from wsm_model.training.config import LoopConfig, OptimiserConfig
 from wsm_model.training.loop import Hooks, StepResult, TrainingRun, finish_step, resume, train
@@ -42,7 +42,7 @@ def run_of(folder) -> TrainingRun:
     return TrainingRun(model=model, optimiser=torch.optim.AdamW(groups), folder=folder, identity={"of": "numbers"})
 
 
-def trained(run: TrainingRun, bad_step: int = 0):
+def trained(run: TrainingRun, bad_step: int = 0, told_to_end_at: int = 0):
     """Weights at the end, and what was seen and told on the way."""
     told = {"batches": [], "metrics": [], "sample": [], "progress": []}
 
@@ -57,6 +57,7 @@ def trained(run: TrainingRun, bad_step: int = 0):
         metrics=lambda step, values: told["metrics"].append((step, values["learning_rate"])),
         sample=told["sample"].append,
         progress=told["progress"].append,
+        must_stop=lambda: told["batches"][-1] == told_to_end_at,
     )
     loader = Numbers()
     train(run, step, loader, CONFIG, hooks=hooks, done=resume(run, loader))
@@ -78,3 +79,18 @@ def test_a_run_that_ends_in_an_error_goes_on_from_its_last_checkpoint_to_the_sam
     found, told = trained(run_of(tmp_path / "b"))
     assert told["batches"] == [3, 4, 5]
     assert torch.equal(found, wanted)
+
+
+def test_told_to_end_it_saves_the_step_it_is_at_and_goes_on_to_the_same_bits(tmp_path):
+    wanted, _ = trained(run_of(tmp_path / "a"))
+    with pytest.raises(Preempted, match=r"step-000003 holds step 3; run the same command again") as told:
+        trained(run_of(tmp_path / "b"), told_to_end_at=3)
+    assert told.value.exit_code == 128 + 15  # of a program that SIGTERM ended
+    found, told = trained(run_of(tmp_path / "b"))
+    assert told["batches"] == [4, 5]
+    assert torch.equal(found, wanted)
+
+
+def test_told_to_end_at_the_last_step_it_has_ended(tmp_path):
+    trained(run_of(tmp_path), told_to_end_at=5)
+    assert [path.name for path in checkpoints(tmp_path)] == ["step-000004", "step-000005"]
