@@ -66,7 +66,9 @@ class Reason(StrEnum):
     CLOUD_HEADER = "cloud.header"
     CLOUD_EMPTY = "cloud.empty"
     CLOUD_NO_OBSTACLES = "cloud.no_obstacles"
+    CLOUD_DISAGREES = "cloud.disagrees"  # it shows another place than depth images do
     MAP_TOO_LARGE = "map.too_large"
+    PATH_OFF_MAP = "path.off_map"  # the path leads over floor that the cloud never showed
     PATH_THROUGH_OBSTACLE = "path.through_obstacle"
     GOAL_UNREACHABLE = "goal.unreachable"
 

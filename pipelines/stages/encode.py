@@ -14,7 +14,7 @@ from pipelines.running.stage import Finished, Outcome, Settled, Stage, StageCont
 from pipelines.running.upstream import done_outcomes, quarantine_of, require_stage
 from wsm_data.clips.build import ClipVideos, Provenance, build_clip, measure_quality, read_videos
 from wsm_data.clips.config import ClipConfig
-from wsm_data.clips.depth_gate import require_depth_agreement
+from wsm_data.clips.episode_gate import require_sound
 from wsm_data.clips.scene_view import SceneView, view_scene
 from wsm_data.codecs.base import VideoCodec
 from wsm_data.codecs.clip_video import VideoMemory
@@ -159,7 +159,7 @@ def _prepare(
     for record, frames in source.reader.iter_frames(source.root, scene.container, source.dataset, records):
         unit = units[record.id.text]
         try:
-            require_depth_agreement(record, frames, source.dataset)
+            require_sound(record, frames, scene_map, source.dataset)
             view = view_scene(record, scene_map, source.dataset, config.clip)
             videos = read_videos(record, frames, source.dataset, config.clip, memory)
             yield _Prepared(unit=unit, record=record, view=view, videos=videos)
@@ -227,5 +227,5 @@ def _finish(config: EncodeConfig, context: StageContext, settled: Settled) -> Fi
 
 
 STAGE = Stage(
-    name="encode", version=3, config_type=EncodeConfig, list_units=_list_units, process=_process, finish=_finish
+    name="encode", version=4, config_type=EncodeConfig, list_units=_list_units, process=_process, finish=_finish
 )

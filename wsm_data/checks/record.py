@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from wsm_data.checks.gate import joined_verdict
 from wsm_data.checks.intrinsics_fit import check_intrinsics_fit
 from wsm_data.checks.length import check_length
 from wsm_data.checks.mount import check_mount
@@ -24,14 +25,14 @@ def check_record(record: EpisodeRecord, dataset: DatasetManifest) -> tuple[Verdi
 
 
 def record_refusal(record: EpisodeRecord, dataset: DatasetManifest) -> Refusal | None:
-    """The first reason not to keep a record, written down; None where every check keeps it."""
-    for verdict in check_record(record, dataset):
-        if verdict.reason is not None:
-            return Refusal(
-                unit=record.id.text,
-                source=record.container,
-                reason=verdict.reason,
-                message=verdict.message,
-                details=verdict.measured,
-            )
-    return None
+    """The reasons not to keep a record, written down under the first; None where every check keeps it."""
+    verdict = joined_verdict(check_record(record, dataset))
+    if verdict.reason is None:
+        return None
+    return Refusal(
+        unit=record.id.text,
+        source=record.container,
+        reason=verdict.reason,
+        message=verdict.message,
+        details=verdict.measured,
+    )

@@ -2,12 +2,12 @@
 
 import logging
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from itertools import chain
 
 import numpy as np
 
 from wsm_data.checks.depth_agreement import check_depth_agreement
-from wsm_data.checks.gate import require_kept
 from wsm_data.codecs.depth import depth_m_from_raw
 from wsm_data.codecs.images import depth_codes
 from wsm_data.errors import DataError
@@ -32,17 +32,36 @@ _ROUNDING_M = 1e-6
 """Steps of 0.1 m add up to their multiples, but for this."""
 
 
-def require_depth_agreement(record: EpisodeRecord, frames: EpisodeFrames, dataset: DatasetManifest) -> None:
-    """Refuse a trajectory whose depth contradicts its poses.
+@dataclass(frozen=True, kw_only=True)
+class DepthSamples:
+    """A few depth images of a trajectory.
+
+    Attributes:
+        pairs: frames that are compared.
+        depth_m: by frame, depth along the optical axis, m, 0 without measurement; float32 [H, W].
+    """
+
+    pairs: tuple[tuple[int, int], ...]
+    depth_m: Mapping[int, Float32Array]
+
+
+def sample_depth(record: EpisodeRecord, frames: EpisodeFrames, dataset: DatasetManifest) -> DepthSamples:
+    """Decode the depth images that the checks look at.
 
     Raises:
-        DataError: `pose.depth_disagree`, naming the camera axes or the offset that would fit; or a frame does not
-            decode.
+        DataError: one of them does not decode.
     """
     measured = {number: image for number, image in enumerate(frames.depth) if image is not None}
-    pairs = spread_pairs(record, sorted(measured))
+    pairs = tuple(spread_pairs(record, sorted(measured)))
     depth_m = {number: _depth_m(record, number, measured[number], dataset) for number in sorted({*chain(*pairs)})}
-    require_kept(check_depth_agreement(record, depth_m, pairs, dataset.camera_axes, dataset.checks.max_depth_error))
+    return DepthSamples(pairs=pairs, depth_m=depth_m)
+
+
+def check_samples(record: EpisodeRecord, samples: DepthSamples, dataset: DatasetManifest) -> Verdict:
+    """Whether depth images contradict the poses (`pose.depth_disagree`), naming what would fit."""
+    return check_depth_agreement(
+        record, samples.depth_m, samples.pairs, dataset.camera_axes, dataset.checks.max_depth_error
+    )
 
 
 def agreeing_records(
@@ -78,8 +97,8 @@ def _samples_verdict(record: EpisodeRecord, samples: Mapping[int, DepthFrame], d
             depth_m[number] = _depth_m(record, number, samples[number], dataset)
         except DataError:
             continue
-    whole = [(a, b) for a, b in pairs if a in depth_m and b in depth_m]
-    return check_depth_agreement(record, depth_m, whole, dataset.camera_axes, dataset.checks.max_depth_error)
+    whole = tuple((a, b) for a, b in pairs if a in depth_m and b in depth_m)
+    return check_samples(record, DepthSamples(pairs=whole, depth_m=depth_m), dataset)
 
 
 def spread_pairs(record: EpisodeRecord, numbers: Sequence[int]) -> list[tuple[int, int]]:

@@ -6,6 +6,7 @@ import numpy as np
 
 from wsm_data.checks.expert_path import check_expert_path
 from wsm_data.checks.gate import require_kept
+from wsm_data.checks.path_shown import check_path_shown
 from wsm_data.checks.reachability import check_goal_reachable
 from wsm_data.clips.config import ClipConfig
 from wsm_data.errors import DataError, Reason
@@ -46,11 +47,14 @@ def view_scene(record: EpisodeRecord, scene_map: SceneMap, dataset: DatasetManif
     leaves out.
 
     Raises:
-        DataError: the path leads through an obstacle or far away from the map, or the goal cannot be reached.
+        DataError: the path leads through an obstacle, over floor that the cloud never showed or far away from the map,
+            or the goal cannot be reached.
     """
     path_xy_m, radius_m = record.path_xy_m, dataset.robot.radius_m
     floor = occupancy_for(scene_map, record.floor_z_m, record.camera_height_m, dataset.robot)
     floor = _around_path(floor, path_xy_m, config.map_margin_m, record.id.text)
+    if scene_map.origin == "cloud":
+        require_kept(check_path_shown(floor, path_xy_m, record.id.text, dataset.checks.max_unknown_path_share))
     floor, filled = fill_holes(floor, config.fill_holes_cells)
     floor, freed = free_swept_cells(floor, path_xy_m, radius_m)
     require_kept(check_expert_path(clearance_m(floor, path_xy_m), record.id.text, dataset.checks.min_path_clearance_m))

@@ -28,6 +28,10 @@ class CheckLimits:
             InternData-N1 is 0.21 m, and a map of 0.05 m cells misplaces path and obstacle by up to half a cell's
             diagonal each, 0.035 m. So a sound path keeps 0.14 m on the map; under 0.10 m the path, the map or their
             alignment is wrong.
+        min_cloud_share: least share of the points of depth images, over the floor and above it, that lie within a
+            voxel of the scene's cloud. On generated homes it is 0.99 and more, with the noise of a Kinect and poses
+            that jitter by 1 cm and 0.5 degrees too; a cloud moved by 0.3 m or more leaves 0.71 at most of one of them.
+        max_unknown_path_share: largest share of the path over cells of the floor that the scene's cloud never showed.
     """
 
     min_camera_height_m: float = 0.05
@@ -41,6 +45,8 @@ class CheckLimits:
     max_published_error: float = 0.03
     max_depth_error: float = 0.02
     min_path_clearance_m: float = 0.10
+    min_cloud_share: float = 0.75
+    max_unknown_path_share: float = 0.5
 
     def __post_init__(self) -> None:
         for field in fields(self):

@@ -24,9 +24,11 @@ def test_all_faults_of_a_record_are_told_in_a_fixed_order(make_record, dataset):
     ]
 
 
-def test_the_first_fault_is_the_refusal_and_a_sound_record_has_none(make_record, dataset):
+def test_a_refusal_stands_under_the_first_fault_and_tells_all_and_a_sound_record_has_none(make_record, dataset):
     assert record_refusal(make_record(), dataset) is None
     record = make_record(frames=4, height_m=3.0)
     refusal = record_refusal(record, dataset)
     assert (refusal.unit, refusal.source) == (record.id.text, record.container)
-    assert (refusal.reason, refusal.details) == (Reason.EPISODE_TOO_SHORT, {"frames": 4})
+    assert (refusal.reason, refusal.details["frames"]) == (Reason.EPISODE_TOO_SHORT, 4)
+    assert [one["reason"] for one in refusal.details["also"]] == [Reason.MOUNT_MISFIT]
+    assert "camera_height_m must lie in [0.05, 2], found 3" in refusal.message

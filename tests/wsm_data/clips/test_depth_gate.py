@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from box_room import DATASET, METRES_PER_UNIT, PILLAR, Drive, Room, along_x, encoded, frames_of, raw_depth, record_of
 
-from wsm_data.clips.depth_gate import MAX_PAIRS, SPACING_M, agreeing_records, require_depth_agreement, spread_pairs
+from wsm_data.checks.gate import require_kept
+from wsm_data.clips.depth_gate import MAX_PAIRS, SPACING_M, agreeing_records, check_samples, sample_depth, spread_pairs
 from wsm_data.errors import DataError, Reason
 from wsm_data.geometry.camera import T_OPENGL_OPENCV
 from wsm_data.geometry.transform import invert
@@ -16,6 +17,10 @@ from wsm_data.schema.identity import EpisodeId
 DRIVE = along_x()
 BACKWARDS = np.diag([-1.0, 1.0, -1.0, 1.0])
 FRAMES = frames_of(DRIVE)
+
+
+def require_agreement(record, frames, dataset):
+    require_kept(check_samples(record, sample_depth(record, frames, dataset), dataset))
 
 
 def with_depth(frames, **pngs):
@@ -31,12 +36,12 @@ def pairs_of(drive, every=1):
 
 def refusal(record, frames=FRAMES, dataset=DATASET):
     with pytest.raises(DataError) as caught:
-        require_depth_agreement(record, frames, dataset)
+        require_agreement(record, frames, dataset)
     return caught.value
 
 
 def test_depth_that_fits_its_poses_is_let_through():
-    require_depth_agreement(record_of(DRIVE), FRAMES, DATASET)
+    require_agreement(record_of(DRIVE), FRAMES, DATASET)
 
 
 def test_how_far_depth_may_err_is_the_manifests():
@@ -46,13 +51,13 @@ def test_how_far_depth_may_err_is_the_manifests():
     frames = replace(FRAMES, depth=tuple(encoded(".png", image) for image in raw))
     assert refusal(record_of(DRIVE), frames).reason is Reason.POSE_DEPTH_DISAGREE
     noisy = replace(DATASET, checks=CheckLimits(max_depth_error=0.1))
-    require_depth_agreement(record_of(DRIVE), frames, noisy)
+    require_agreement(record_of(DRIVE), frames, noisy)
 
 
 def test_frames_without_depth_are_left_out_of_the_pairs():
     wrong = record_of(DRIVE, T_world_camera=DRIVE.T_world_camera @ T_OPENGL_OPENCV)
     assert refusal(wrong, with_depth(FRAMES, frame_2=None, frame_4=None)).reason is Reason.POSE_DEPTH_DISAGREE
-    require_depth_agreement(wrong, replace(FRAMES, depth=(None,) * len(FRAMES.rgb)), DATASET)
+    require_agreement(wrong, replace(FRAMES, depth=(None,) * len(FRAMES.rgb)), DATASET)
 
 
 def test_poses_that_were_stored_in_other_axes_are_refused_and_the_fitting_ones_named():
@@ -87,7 +92,7 @@ def test_codes_that_mean_no_measurement_are_not_taken_for_depth():
     raw = raw_depth(DRIVE)
     raw[:, :, 22:] = 65535
     frames = replace(FRAMES, depth=tuple(encoded(".png", image) for image in raw))
-    require_depth_agreement(record_of(DRIVE), frames, DATASET)
+    require_agreement(record_of(DRIVE), frames, DATASET)
     as_depth = replace(DATASET, depth=replace(DATASET.depth, invalid_codes=(0,)))
     assert refusal(record_of(DRIVE), frames, as_depth).reason is Reason.POSE_DEPTH_DISAGREE
 
@@ -97,7 +102,7 @@ def test_a_compared_frame_that_does_not_decode_is_refused_and_named_and_the_othe
     error = refusal(record_of(DRIVE), with_depth(FRAMES, frame_4=b"no png"))
     assert error.reason is Reason.FRAME_UNDECODABLE
     assert "box_d435i/hall/000000, depth frame 4" in error.message
-    require_depth_agreement(record_of(DRIVE), with_depth(FRAMES, frame_3=b"no png"), DATASET)
+    require_agreement(record_of(DRIVE), with_depth(FRAMES, frame_3=b"no png"), DATASET)
 
 
 @pytest.mark.parametrize("step_m", [0.02, 0.07, 0.3, 0.9])
@@ -117,13 +122,13 @@ def test_a_turn_is_way_too():
     turning = Drive(xy_m=np.full((40, 2), 1.5), yaw_rad=0.1 * np.arange(40))
     assert {b - a for a, b in pairs_of(turning)} <= {5, 6}  # 0.1 rad a frame
     assert len(pairs_of(turning)) == MAX_PAIRS
-    require_depth_agreement(record_of(turning), frames_of(turning), DATASET)
+    require_agreement(record_of(turning), frames_of(turning), DATASET)
 
 
 def test_a_way_shorter_than_a_pair_is_one_and_a_camera_that_stands_still_none():
     assert pairs_of(along_x(frames=5, step_m=0.02)) == [(0, 4)]
     still = Drive(xy_m=np.full((6, 2), 1.5), yaw_rad=np.zeros(6))
-    require_depth_agreement(record_of(still), frames_of(still), DATASET)
+    require_agreement(record_of(still), frames_of(still), DATASET)
 
 
 def test_what_goes_wrong_late_is_found_too():
@@ -132,7 +137,7 @@ def test_what_goes_wrong_late_is_found_too():
     drive = along_x(room=hall, frames=49, turn_rad=0.0)
     poses = drive.T_world_camera
     poses[40:, 1, 3] += 0.08 * np.arange(9)
-    require_depth_agreement(record_of(drive), frames_of(drive), DATASET)
+    require_agreement(record_of(drive), frames_of(drive), DATASET)
     assert refusal(record_of(drive, T_world_camera=poses), frames_of(drive)).reason is Reason.POSE_DEPTH_DISAGREE
 
 

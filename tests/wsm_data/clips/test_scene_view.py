@@ -37,8 +37,12 @@ def scene_map(rooms, drives, keep=lambda xyz: np.ones(len(xyz), bool), extra=())
     return build_scene_map(voxels, floors, DATASET.robot, DATASET.max_camera_height_m)
 
 
-def look(drive, scene, config=CONFIG):
-    return view_scene(record_of(drive), scene, DATASET, config)
+UNSEEN = replace(DATASET, checks=CheckLimits(max_unknown_path_share=1.0))
+"""A source whose clouds need not show the floor under the path."""
+
+
+def look(drive, scene, config=CONFIG, dataset=DATASET):
+    return view_scene(record_of(drive), scene, dataset, config)
 
 
 def refusal(drive, scene, config=CONFIG):
@@ -129,7 +133,9 @@ def test_nothing_is_freed_where_the_floor_is_known():
 def test_unknown_cells_under_the_robot_are_freed_and_counted_and_others_stay_unknown():
     drive = along_x()
     scene = scene_map([HALL], [drive], keep=lambda xyz: (xyz[:, 1] > 1.3) | (xyz[:, 1] < 0))
-    view = look(drive, scene)
+    error = refusal(drive, scene)
+    assert (error.reason, error.details["unknown_path_share"]) == (Reason.PATH_OFF_MAP, 1.0)
+    view = look(drive, scene, dataset=UNSEEN)
     x, y = np.meshgrid(*(np.arange(n) + 0.5 for n in view.occupancy.cells.shape[::-1]))
     x, y = (x + view.occupancy.origin_cell[0]) * CELL_M, (y + view.occupancy.origin_cell[1]) * CELL_M
     along = np.clip(x, drive.xy_m[0, 0], drive.xy_m[-1, 0])
@@ -155,7 +161,7 @@ def test_holes_are_filled_where_that_is_asked_for_and_counted_with_the_swept_cel
 
 def test_a_floor_of_which_nothing_was_seen_is_what_the_robot_swept_and_no_larger():
     upstairs = moved(along_x(room=UPSTAIRS), xy_m=along_x().xy_m + 900.0)
-    view = look(upstairs, scene_map([HALL], [upstairs]), NARROW)
+    view = look(upstairs, scene_map([HALL], [upstairs]), NARROW, UNSEEN)
     assert view.freed_cells == (view.occupancy.cells == FREE).sum() > 0
     assert view.occupancy.cells.size < 100 * 100
     assert view.distance_m[-1] == 0

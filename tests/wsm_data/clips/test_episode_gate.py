@@ -1,0 +1,47 @@
+"""A trajectory against its cloud and its images, in an analytic room."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from box_room import DATASET, HALL, along_x, cloud_points, frames_of, record_of
+
+from wsm_data.clips.episode_gate import require_sound
+from wsm_data.errors import DataError, Reason
+from wsm_data.maps.scene_map import build_scene_map
+from wsm_data.maps.voxels import voxels_from_depth
+from wsm_data.schema.dataset import DatasetManifest
+
+DRIVE = along_x(frames=13, step_m=0.15)
+FRAMES = frames_of(DRIVE)
+
+
+def scene(offset_m=(0.0, 0.0, 0.0), origin="cloud"):
+    xyz = cloud_points([HALL])[0] + np.array(offset_m)
+    return build_scene_map(replace(voxels_from_depth([xyz]), origin=origin), (0.0,), DATASET.robot, 2.0)
+
+
+def refusal(record=None, frames=FRAMES, scene_map=None, dataset: DatasetManifest = DATASET):
+    with pytest.raises(DataError) as caught:
+        require_sound(record or record_of(DRIVE), frames, scene_map or scene(), dataset)
+    return caught.value
+
+
+def test_a_sound_trajectory_goes_on():
+    require_sound(record_of(DRIVE), FRAMES, scene(), DATASET)
+
+
+def test_the_cloud_of_another_place_is_refused():
+    assert refusal(scene_map=scene((0.0, 0.0, 0.3))).reason is Reason.CLOUD_DISAGREES
+
+
+def test_a_map_that_was_fused_from_depth_is_not_held_against_it():
+    require_sound(record_of(DRIVE), FRAMES, scene((30.0, 0.0, 0.0), "depth"), DATASET)
+
+
+def test_all_reasons_are_told():
+    backwards = record_of(DRIVE, T_world_camera=DRIVE.T_world_camera @ np.diag([-1.0, 1.0, -1.0, 1.0]))
+    error = refusal(backwards, scene_map=scene((30.0, 0.0, 0.0)))
+    assert error.reason is Reason.POSE_DEPTH_DISAGREE
+    assert Reason.CLOUD_DISAGREES in [one["reason"] for one in error.details["also"]]
+    assert "; also cloud.disagrees: " in error.message

@@ -1,0 +1,50 @@
+"""Is a trajectory sound? What its images, its poses and the map of its scene say of one another."""
+
+import numpy as np
+
+from wsm_data.checks.cloud_agreement import check_cloud_agreement, height_bands
+from wsm_data.checks.gate import require_kept
+from wsm_data.clips.depth_gate import DepthSamples, check_samples, sample_depth
+from wsm_data.geometry.camera import pixel_rays
+from wsm_data.geometry.transform import transform_points
+from wsm_data.maps.scene_map import SceneMap
+from wsm_data.schema.arrays import Float64Array
+from wsm_data.schema.dataset import DatasetManifest
+from wsm_data.schema.episode import EpisodeRecord
+from wsm_data.schema.frames import EpisodeFrames
+from wsm_data.schema.verdict import Verdict
+
+POINTS_PER_FRAME = 800
+"""So many pixels of a sampled frame are held against the cloud at most."""
+
+FARTHEST_M = 4.0
+"""Points farther away are not held against the cloud: there the noise of depth cameras nears a voxel."""
+
+
+def require_sound(record: EpisodeRecord, frames: EpisodeFrames, scene_map: SceneMap, dataset: DatasetManifest) -> None:
+    """Refuse a trajectory whose images contradict its poses or the cloud of its scene.
+
+    Raises:
+        DataError: the first reason, with all others in the message; or a frame does not decode.
+    """
+    samples = sample_depth(record, frames, dataset)
+    require_kept(check_samples(record, samples, dataset), check_cloud(record, samples, scene_map, dataset))
+
+
+def check_cloud(record: EpisodeRecord, samples: DepthSamples, scene_map: SceneMap, dataset: DatasetManifest) -> Verdict:
+    """Whether depth images show the place that the cloud shows; a map that was fused from depth tells nothing."""
+    if scene_map.origin != "cloud" or not samples.depth_m:
+        return Verdict()
+    points_m = np.concatenate([_world_points(record, number, samples) for number in samples.depth_m])
+    bands = height_bands(points_m, record.floor_z_m, dataset.robot, record.camera_height_m)
+    level = scene_map.level_at(record.floor_z_m)
+    return check_cloud_agreement(bands, level, record.id.text, dataset.checks.min_cloud_share)
+
+
+def _world_points(record: EpisodeRecord, number: int, samples: DepthSamples) -> Float64Array:
+    """Points that a frame shows on a square lattice of its pixels, in the world, m; float64 [N, 3]."""
+    depth_m = samples.depth_m[number]
+    stride = int(np.ceil(np.sqrt(depth_m.size / POINTS_PER_FRAME)))
+    lattice_m = depth_m[::stride, ::stride].astype(np.float64)
+    points_m = pixel_rays(record.intrinsics)[::stride, ::stride] * lattice_m[..., None]
+    return transform_points(record.T_world_camera[number], points_m[(lattice_m > 0) & (lattice_m < FARTHEST_M)])
