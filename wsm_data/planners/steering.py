@@ -17,9 +17,14 @@ _LOOK_M = 0.2
 _BEGIN_TURN_RAD, _END_TURN_RAD = math.radians(28), math.radians(10)
 _BEND_RAD = math.radians(40)
 _TURN_PER_STEP_RAD = 0.075
-_PATIENCE_STEPS, _EARLIEST_STEPS, _LATEST_STEPS = 26, 14, 20
-_NUDGE_STEPS = 3
-_NUDGE_ROOM_M = 0.25
+_PATIENCE_STEPS, _EARLIEST_STEPS, _LATEST_STEPS = 23, 14, 20
+_NUDGE_STEPS = 2
+_NUDGE_ROOM_M, _NUDGE_MOST_M, _OVERSHOOT_M = 0.12, 0.6, 0.04
+"""In its two steps the robot drives 0.15 m at most, and where the point is near, 0.04 m less than up to it."""
+
+_TIGHT_M = 0.5
+"""With less room ahead than this the robot turns to its way to the end before it drives."""
+
 _STANDING_M = 0.05
 
 
@@ -30,6 +35,7 @@ class Steering:
         self._side = 0.0
         self._turning_since = -1
         self._nudging_since = -_NUDGE_STEPS
+        self._nudge_m = 0.0
 
     def path(self, way_xy_m: Float64Array, step: int, free_ahead_m: float) -> Float64Array:
         """The path to answer with.
@@ -47,10 +53,11 @@ class Steering:
             self._stop_turning()
             return np.zeros((_POINTS, 2))
         if step < self._nudging_since + _NUDGE_STEPS:
-            return _straight_ahead()
+            return _to(self._nudge_m)
         look = way[min(len(way) - 1, round(_LOOK_M / _SPACING_M))]
         bearing = math.atan2(look[1], look[0])
-        if abs(bearing) < (_BEGIN_TURN_RAD if self._turning_since < 0 else _END_TURN_RAD):
+        loose = self._turning_since < 0 and free_ahead_m > _TIGHT_M
+        if abs(bearing) < (_BEGIN_TURN_RAD if loose else _END_TURN_RAD):
             self._stop_turning()
             return _filled(_until_bend(way, bearing))
         return self._turn(bearing, step, free_ahead_m)
@@ -63,16 +70,18 @@ class Steering:
         turned, rest = step - self._turning_since, abs(bearing) / _TURN_PER_STEP_RAD
         due = turned >= _EARLIEST_STEPS and (rest < _PATIENCE_STEPS - 2 or turned >= _LATEST_STEPS)
         if due and turned + rest > _PATIENCE_STEPS and free_ahead_m > _NUDGE_ROOM_M:
+            self._nudge_m = min(_NUDGE_MOST_M, free_ahead_m + _OVERSHOOT_M)
             self._turning_since, self._nudging_since = step + _NUDGE_STEPS, step
-            return _straight_ahead()
+            return _to(self._nudge_m)
         return np.tile(np.array([0.0, self._side]), (_POINTS, 1))
 
     def _stop_turning(self) -> None:
         self._side, self._turning_since = 0.0, -1
 
 
-def _straight_ahead() -> Float64Array:
-    return np.column_stack([_SPACING_M * np.arange(1, _POINTS + 1), np.zeros(_POINTS)])
+def _to(ahead_m: float) -> Float64Array:
+    """A point straight ahead, repeated: the controller drives to it and stops."""
+    return np.tile(np.array([max(ahead_m, 0.0), 0.0]), (_POINTS, 1))
 
 
 def _along(way: Float64Array) -> Float64Array:
