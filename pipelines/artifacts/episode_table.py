@@ -2,13 +2,14 @@
 
 import hashlib
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from wsm_data.errors import IntegrityError
+from wsm_data.files.json_values import from_json, to_json
 from wsm_data.files.jsonlines import canonical_json, read_lines, write_lines
 from wsm_data.schema.episode import EpisodeRecord
 from wsm_data.schema.identity import EpisodeId
@@ -46,7 +47,7 @@ def record_digest(record: EpisodeRecord) -> str:
     stated = {
         "content": record.content_digest,
         "frames": record.frames_digest,
-        "intrinsics": asdict(record.intrinsics),
+        "intrinsics": to_json(record.intrinsics),
         "camera_height_m": record.camera_height_m,
         "camera_pitch_rad": record.camera_pitch_rad,
         "notes": record.notes,
@@ -58,21 +59,33 @@ def record_digest(record: EpisodeRecord) -> str:
 
 def write_episodes(folder: Path, rows: Iterable[EpisodeRow]) -> None:
     """Write the table, sorted by id."""
-    ordered = sorted(rows, key=lambda row: row.id)
-    write_lines(folder / EPISODES_FILE, [{**vars(row), "id": row.id.text} for row in ordered])
+    write_lines(folder / EPISODES_FILE, [row_json(row) for row in sorted(rows, key=lambda row: row.id)])
 
 
 def read_episodes(folder: Path) -> list[EpisodeRow]:
     """All accepted trajectories, sorted by id.
 
     Raises:
-        IntegrityError: the table is gone although the stage says that it is done.
+        IntegrityError: the table is gone although the stage says that it is done, or a line of it is no such row.
     """
-    if not (folder / EPISODES_FILE).exists():
-        raise IntegrityError(f"{folder / EPISODES_FILE} is missing; run `wsm index` again")
-    return [row_from_json(line) for line in read_lines(folder / EPISODES_FILE)]
+    path = folder / EPISODES_FILE
+    if not path.exists():
+        raise IntegrityError(f"{path} is missing; run `wsm index` again")
+    try:
+        return [row_from_json(line) for line in read_lines(path)]
+    except ValueError as error:
+        raise IntegrityError(f"{path} must hold a trajectory a line, but: {error}; run `wsm index` again") from error
+
+
+def row_json(row: EpisodeRow) -> dict[str, Any]:
+    """The JSON object that stands for a row in the table and among the facts of its container."""
+    return {**to_json(row), "id": row.id.text}
 
 
 def row_from_json(line: Mapping[str, Any]) -> EpisodeRow:
-    """A row from the JSON object that stands for it in the table and among the facts of its container."""
-    return EpisodeRow(**{**line, "id": EpisodeId.parse(line["id"])})
+    """Inverse of `row_json`.
+
+    Raises:
+        ValueError: it is none of a row.
+    """
+    return from_json(EpisodeRow, {**line, "id": to_json(EpisodeId.parse(str(line.get("id"))))})

@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from pipelines.artifacts.episode_table import read_episodes
-from pipelines.running.folder import refusal_json
 from pipelines.running.upstream import pending_units, quarantine_of
 from wsm_data.errors import Reason
+from wsm_data.files.json_values import to_json
 from wsm_data.schema.verdict import Refusal
 from wsm_data.shards.inventory import InventoryRow, UnitState
 
@@ -51,8 +51,8 @@ def account_of(index: Path, encode: Path, splits: Mapping[str, str], clips: Mapp
             state, container = UnitState.PENDING, row.container
             rows.append(InventoryRow(unit=name, container=container, state=state, source_digest=row.digest))
     rows += [_refused_row(refusal) for refusal in (*at_index, *at_encode)]
-    quarantine = [{**refusal_json(one), "stage": "index"} for one in at_index]
-    quarantine += [{**refusal_json(one), "stage": "encode"} for one in at_encode]
+    quarantine = [{**to_json(one), "stage": "index"} for one in at_index]
+    quarantine += [{**to_json(one), "stage": "encode"} for one in at_encode]
     return Account(rows=tuple(rows), quarantine=tuple(quarantine))
 
 

@@ -12,6 +12,7 @@ from wsm_data.curation.audit.guards import AuditConfig, audit_release, count_fin
 from wsm_data.curation.diversity import DiversityConfig
 from wsm_data.curation.split import SplitBy
 from wsm_data.errors import ConfigError, IntegrityError
+from wsm_data.files.json_values import to_json
 from wsm_data.shards.manifest import release_digest
 from wsm_data.view.drawing.text_table import aligned
 
@@ -58,7 +59,7 @@ def _json(release: Release, findings: Sequence[AuditFinding]) -> str:
         "release_digest": release_digest(release.manifest),
         "clips": len(release.index),
         "counts": {check.value: count for check, count in count_findings(findings).items()},
-        "findings": [one.to_json() for one in findings],
+        "findings": to_json(findings),
     }
     return json.dumps(record, indent=2)
 

@@ -2,14 +2,14 @@
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from pipelines.artifacts.episode_table import read_episodes
 from pipelines.artifacts.layout import clips_folder, codec_path, map_path, records_path
-from pipelines.artifacts.source import IndexedSource, container_from_json, conventions_digest, indexed_source
+from pipelines.artifacts.source import IndexedSource, conventions_digest, indexed_source
 from pipelines.running.stage import Finished, Outcome, Settled, Stage, StageContext, Unit, refused
 from pipelines.running.upstream import done_outcomes, quarantine_of, require_stage
 from wsm_data.clips.build import ClipVideos, Provenance, build_clip, measure_quality, read_videos
@@ -22,6 +22,7 @@ from wsm_data.codecs.registry import CodecConfig, describe_codec, make_codec
 from wsm_data.errors import ConfigError, DataError
 from wsm_data.files.atomic import write_text
 from wsm_data.files.digest import sha256_bytes
+from wsm_data.files.json_values import from_json, to_json
 from wsm_data.files.typed_toml import INPUT, SELECTION
 from wsm_data.maps.scene_map import SceneMap, floor_levels, load_scene_map
 from wsm_data.readers.record_table import read_records
@@ -90,7 +91,7 @@ def _list_units(config: EncodeConfig) -> Sequence[Unit]:
             map_digest = f"refused {without.reason}"
         elif row.container in maps:
             mapped = maps[row.container].facts
-            container = container_from_json(containers[row.container].facts["container"])
+            container = from_json(Container, containers[row.container].facts["container"])
             scene = _SceneInput(container=container, map_from="depth" if mapped["fused_from_depth"] else "cloud")
             map_digest = level_digest(mapped, row.floor_z_m)
         else:
@@ -215,14 +216,14 @@ def _quality(
     one: _Prepared, latents: tuple[Float32Array, Float32Array], codec: VideoCodec, config: EncodeConfig
 ) -> dict[str, object] | None:
     rank = int(sha256_bytes(one.unit.id.encode())[:8], 16) / 16**8
-    return measure_quality(one.videos, latents, codec, config.clip).to_json() if rank < config.quality_share else None
+    return to_json(measure_quality(one.videos, latents, codec, config.clip)) if rank < config.quality_share else None
 
 
 def _finish(config: EncodeConfig, context: StageContext, settled: Settled) -> Finished:
     """Write what the codec says of itself beside the clips, for the release."""
     del settled
     _video_memory.cache_clear()  # the stages that follow in this process need it for other things
-    write_text(codec_path(context.out), json.dumps(asdict(describe_codec(config.codec)), indent=2) + "\n")
+    write_text(codec_path(context.out), json.dumps(to_json(describe_codec(config.codec)), indent=2) + "\n")
     return Finished(outputs=(str(codec_path(context.out).relative_to(context.out)),))
 
 

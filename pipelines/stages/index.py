@@ -6,16 +6,23 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from pipelines.artifacts.episode_table import EPISODES_FILE, record_digest, row_from_json, write_episodes
+from pipelines.artifacts.episode_table import (
+    EPISODES_FILE,
+    EpisodeRow,
+    record_digest,
+    row_from_json,
+    row_json,
+    write_episodes,
+)
 from pipelines.artifacts.layout import conventions_path, records_path, surface_path
-from pipelines.artifacts.source import container_json, conventions_digest, write_conventions
-from pipelines.running.folder import refusal_json
+from pipelines.artifacts.source import conventions_digest, write_conventions
 from pipelines.running.settings import config_json
 from pipelines.running.stage import DONE, Finished, Outcome, Settled, Stage, StageContext, Unit, refused
 from wsm_data.checks.record import record_refusal
 from wsm_data.clips.scene_surface import scene_surface
 from wsm_data.errors import DataError, Reason
 from wsm_data.files.digest import digest_json, sha256_file
+from wsm_data.files.json_values import to_json
 from wsm_data.files.typed_toml import INPUT
 from wsm_data.maps.voxels import save_voxels, voxels_digest
 from wsm_data.readers.manifest import load_dataset
@@ -82,14 +89,14 @@ def _index_container(
     records.parent.mkdir(parents=True, exist_ok=True)
     write_records(records, kept)
     surface, cloud_refusal = _write_surface(container, scan, kept, dataset, surface_path(out, container.id))
-    rows = [_row(record) for record in kept]
+    rows = [row_json(_row(record)) for record in kept]
     facts = {
         "frames": sum(record.frame_count for record in kept),
         "trajectories": len(kept),
-        "container": container_json(container),
+        "container": to_json(container),
         "episodes": rows,
         "surface": surface,
-        "cloud_refusal": cloud_refusal and refusal_json(cloud_refusal),
+        "cloud_refusal": cloud_refusal and to_json(cloud_refusal),
         "bytes": scan.bytes_read,
     }
     outputs = [records, *([surface_path(out, container.id)] if surface else [])]
@@ -128,15 +135,15 @@ def _write_surface(
     return voxels_digest(voxels), None
 
 
-def _row(record: EpisodeRecord) -> dict[str, object]:
-    return {
-        "id": record.id.text,
-        "container": record.container,
-        "digest": record.content_digest,
-        "record_digest": record_digest(record),
-        "frames": record.frame_count,
-        "floor_z_m": record.floor_z_m,
-    }
+def _row(record: EpisodeRecord) -> EpisodeRow:
+    return EpisodeRow(
+        id=record.id,
+        container=record.container,
+        digest=record.content_digest,
+        record_digest=record_digest(record),
+        frames=record.frame_count,
+        floor_z_m=record.floor_z_m,
+    )
 
 
 def _finish(config: IndexConfig, context: StageContext, settled: Settled) -> Finished:

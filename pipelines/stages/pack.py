@@ -1,6 +1,5 @@
 """`wsm pack`: clips into shards, shards into a release."""
 
-import json
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -15,6 +14,7 @@ from pipelines.running.upstream import UpstreamMissing, done_outcomes, pending_u
 from wsm_data.clips.config import ClipConfig
 from wsm_data.codecs.quality import CodecQuality
 from wsm_data.files.digest import digest_json
+from wsm_data.files.json_values import from_json, load_json, to_json
 from wsm_data.files.typed_toml import INPUT, SELECTION, build_config
 from wsm_data.schema.codec import CodecInfo
 from wsm_data.schema.identity import EpisodeId
@@ -150,7 +150,9 @@ def _facts(config: PackConfig, clips: Mapping[str, Outcome]) -> ReleaseFacts:
     dataset = indexed_source(config.index).dataset
     return ReleaseFacts(
         name=config.name,
-        codec=CodecInfo.from_json(json.loads(codec_path(config.encode).read_text())),
+        codec=load_json(
+            CodecInfo, codec_path(config.encode), "what the codec says of itself", "run `wsm encode` again"
+        ),
         depth_range=clip.depth_range,
         encoded_width_px=clip.width,
         encoded_height_px=clip.height,
@@ -166,9 +168,9 @@ def _quality(clips: Mapping[str, Outcome]) -> dict[str, object]:
     measured = [outcome.facts["quality"] for _, outcome in sorted(clips.items()) if outcome.facts["quality"]]
     merged: CodecQuality | None = None
     for record in measured:
-        quality = CodecQuality.from_json(record)
+        quality = from_json(CodecQuality, record)
         merged = quality if merged is None else merged.merge(quality)
-    return merged.to_json() if merged else {}
+    return to_json(merged) if merged else {}
 
 
 STAGE = Stage(name="pack", version=1, config_type=PackConfig, list_units=_list_units, process=_process, finish=_finish)

@@ -1,8 +1,7 @@
 """What a codec costs: PSNR of colour, and metres of depth error by distance, in sums that can be merged over clips."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -163,17 +162,6 @@ class CodecQuality:
             values=self.values + other.values,
             depth=self.depth.merge(other.depth),
         )
-
-    def to_json(self) -> dict[str, Any]:
-        """JSON object of all fields; numbers survive to the bit."""
-        return asdict(self)
-
-    @classmethod
-    def from_json(cls, record: Mapping[str, Any]) -> "CodecQuality":
-        """Inverse of `to_json`."""
-        depth = record["depth"]
-        tuples = {name: tuple(depth[name]) for name in ("edges_m", "error_sum_m", "counts")}
-        return cls(**{**record, "depth": DepthErrors(**{**depth, **tuples})})
 
 
 def clip_quality(reference: Float32Array, decoded: Float32Array, depth: DepthErrors) -> CodecQuality:

@@ -6,8 +6,9 @@ import tomllib
 import types
 import typing
 from collections.abc import Iterable, Mapping
-from dataclasses import MISSING, fields, is_dataclass
+from dataclasses import MISSING, Field, fields, is_dataclass
 from enum import Enum
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -32,6 +33,7 @@ class Word(str):
     __slots__ = ()
 
 
+_EXACT = frozenset((str, int, bool))
 _TYPE_NAMES = {str: "text in quotes", int: "a whole number", float: "a number", bool: "true or false"}
 
 
@@ -76,8 +78,7 @@ def build_config(config_type: type[ConfigT], values: Mapping[str, Any], where: s
     Raises:
         ConfigError: an unknown key (with the nearest name), a missing one, or a value the type does not take.
     """
-    hints = typing.get_type_hints(config_type)
-    known = {field.name: field for field in fields(config_type)}  # type: ignore[arg-type]
+    hints, known = _type_hints(config_type), _fields(config_type)  # type: ignore[arg-type]
     for key in values:
         if key not in known:
             raise ConfigError(f"unknown key {dotted(where, key)}; {did_you_mean(key, known, where)}")
@@ -99,6 +100,8 @@ def convert(hint: Any, value: Any, name: str) -> Any:
     Raises:
         ConfigError: the type does not take the value; `name` says which field that is.
     """
+    if hint is Any or (type(value) is hint and hint in _EXACT):  # most of the many values that stand beside clips
+        return value
     origin = typing.get_origin(hint)
     if is_dataclass(hint):
         return build_config(typing.cast(type, hint), _section(value, name), name)
@@ -136,6 +139,16 @@ def dotted(where: str, key: str) -> str:
     return f"{where}.{key}" if where else key
 
 
+@cache
+def _fields(config_type: type) -> dict[str, Field[Any]]:
+    return {field.name: field for field in fields(config_type)}
+
+
+@cache
+def _type_hints(config_type: type) -> dict[str, Any]:
+    return typing.get_type_hints(config_type)
+
+
 def _section(value: Any, name: str) -> Mapping[str, Any]:
     if not isinstance(value, Mapping):
         raise ConfigError(f"{name} is a section, found the value {value!r}")
@@ -164,6 +177,8 @@ def _convert_tuple(hint: Any, value: Any, name: str) -> tuple[Any, ...]:
         raise ConfigError(f"{name} takes a list in brackets, found {value!r}")
     of_items = typing.get_args(hint)
     if len(of_items) == 2 and of_items[1] is Ellipsis:
+        if of_items[0] is float and all(type(item) is float and math.isfinite(item) for item in value):
+            return tuple(value)
         return tuple(convert(of_items[0], item, name) for item in value)
     if len(value) != len(of_items):
         raise ConfigError(f"{name} takes {len(of_items)} values, found {len(value)}")

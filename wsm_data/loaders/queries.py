@@ -1,6 +1,5 @@
 """The loader of post-training: queries in the order of the epoch, each with its history, its map and its goal."""
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import TracebackType
@@ -22,7 +21,7 @@ from wsm_data.loaders.order.epoch_order import EpochSummary
 from wsm_data.loaders.reading.verification import verification_of
 from wsm_data.loaders.sources.queries import QueryConfig, QuerySources, open_queries
 from wsm_data.schema.clip import UNREACHABLE_MM
-from wsm_data.schema.clip_meta import ClipMeta
+from wsm_data.schema.clip_meta import ClipMeta, parse_meta
 from wsm_data.schema.occupancy import UNKNOWN
 from wsm_data.schema.sequence import TEMPORAL_RATIO, frames_of
 from wsm_data.shards.clip_bytes import content_of
@@ -203,8 +202,8 @@ class _MapReader:
 
 def _meta(content: memoryview, row: IndexRow) -> ClipMeta:
     try:
-        return ClipMeta.from_json(json.loads(bytes(content)))
-    except (ValueError, TypeError, KeyError) as error:
+        return parse_meta(content)
+    except ValueError as error:
         raise IntegrityError(f"{row.shard}, clip {row.key}: meta.json must be that of a clip, but: {error}") from error
 
 

@@ -1,18 +1,18 @@
 """Provenance of a clip and its small numbers: what stands in `meta.json`."""
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
-from typing import Any, TypeVar
+import json
+from dataclasses import dataclass
 
 import numpy as np
 
+from wsm_data.files.json_values import from_json, to_json
+from wsm_data.files.jsonlines import canonical_json
 from wsm_data.schema.arrays import Float64Array
 from wsm_data.schema.camera import Intrinsics
 from wsm_data.schema.depth import DepthRange
 from wsm_data.schema.identity import EpisodeId
 
 CLIP_FORMAT_VERSION = 1
-_Nested = TypeVar("_Nested", EpisodeId, Intrinsics, DepthRange)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,6 +74,7 @@ class ClipMeta:
     format_version: int = CLIP_FORMAT_VERSION
 
     def __post_init__(self) -> None:
+        _require_version(self.format_version)
         if self.map_from not in ("cloud", "depth"):
             raise ValueError(f"map_from must be 'cloud' or 'depth', found {self.map_from!r}")
         if not 0 <= self.padded_frames < self.frames:
@@ -88,37 +89,23 @@ class ClipMeta:
         """First camera to world, float64 [4, 4], m."""
         return np.array(self.T_world_camera0, np.float64)
 
-    def to_json(self) -> dict[str, Any]:
-        """JSON object of all fields."""
-        return asdict(self)
 
-    @classmethod
-    def from_json(cls, record: Mapping[str, Any]) -> "ClipMeta":
-        """Inverse of `to_json`.
-
-        Raises:
-            ValueError: the format version is another, or a field is missing or unknown.
-        """
-        if record.get("format_version") != CLIP_FORMAT_VERSION:
-            found = record.get("format_version")
-            raise ValueError(f"clip format_version must be {CLIP_FORMAT_VERSION}, found {found!r}; use a matching wsm")
-        names = {field.name for field in fields(cls)}
-        if set(record) != names:
-            raise ValueError(f"meta.json must have exactly the fields of ClipMeta, differing: {set(record) ^ names}")
-        nested = {
-            "id": _parse(EpisodeId, record["id"]),
-            "intrinsics": _parse(Intrinsics, record["intrinsics"]),
-            "depth_range": _parse(DepthRange, record["depth_range"]),
-            "T_world_camera0": tuple(tuple(row) for row in record["T_world_camera0"]),
-        }
-        tuples = {name: tuple(record[name]) for name in ("goal_world_m", "goal_camera0_m", "map_origin_cell", "notes")}
-        return cls(**{**record, **nested, **tuples})
+def meta_bytes(meta: ClipMeta) -> bytes:
+    """The one spelling of meta.json."""
+    return canonical_json(to_json(meta)).encode()
 
 
-def _parse(kind: type[_Nested], record: Mapping[str, Any]) -> _Nested:
-    names = {field.name for field in fields(kind)}
-    if set(record) != names:
-        raise ValueError(
-            f"meta.json: {kind.__name__} must have exactly the fields {sorted(names)}, found {sorted(record)}"
-        )
-    return kind(**record)
+def parse_meta(data: bytes | memoryview) -> ClipMeta:
+    """Inverse of `meta_bytes`.
+
+    Raises:
+        ValueError: it is no JSON object of exactly the fields of a clip's, or of another format version.
+    """
+    record = json.loads(bytes(data))
+    _require_version(record.get("format_version") if isinstance(record, dict) else None)
+    return from_json(ClipMeta, record)
+
+
+def _require_version(found: object) -> None:
+    if found != CLIP_FORMAT_VERSION:
+        raise ValueError(f"clip format_version must be {CLIP_FORMAT_VERSION}, found {found!r}; use a matching wsm")

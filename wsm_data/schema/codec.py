@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,13 +29,3 @@ class CodecInfo:
     latent_mean: tuple[float, ...] = ()
     latent_std: tuple[float, ...] = ()
     settings: Mapping[str, object] = field(default_factory=dict)
-
-    @classmethod
-    def from_json(cls, record: Mapping[str, Any]) -> "CodecInfo":
-        """From the JSON object of all fields (`dataclasses.asdict`).
-
-        Raises:
-            KeyError, TypeError: a field is missing, unknown, or no list where it must be one.
-        """
-        statistics = {name: tuple(record[name]) for name in ("latent_mean", "latent_std")}
-        return cls(**{**record, **statistics})

@@ -1,15 +1,13 @@
 """A clip as the bytes of its members in a tar, and back without copying the arrays."""
 
-import json
 from collections.abc import Sequence
 
 import numpy as np
 
 from wsm_data.errors import IntegrityError
 from wsm_data.files.digest import xxh3_64
-from wsm_data.files.jsonlines import canonical_json
 from wsm_data.schema.clip import Clip
-from wsm_data.schema.clip_meta import ClipMeta
+from wsm_data.schema.clip_meta import meta_bytes, parse_meta
 from wsm_data.shards.members import META, STORED_DTYPES, Member, axes_of, header_bytes, lay_out
 from wsm_data.shards.tar_format import padded, require_key
 
@@ -26,7 +24,7 @@ def encode_clip(clip: Clip) -> tuple[bytes, tuple[Member, ...]]:
         raise ValueError(f"the key of a clip must be that of its id, {clip.meta.id.key!r}, found {key!r}")
     require_key(key, clip.meta.id.text)
     contents: dict[str, memoryview | bytes] = {name: _array_bytes(name, array) for name, array in clip.arrays().items()}
-    contents[META] = canonical_json(clip.meta.to_json()).encode()
+    contents[META] = meta_bytes(clip.meta)
     members = lay_out(
         key,
         axes=axes_of(clip.arrays()),
@@ -50,11 +48,8 @@ def decode_clip(data: memoryview, members: Sequence[Member], where: str) -> Clip
     try:
         arrays = {member.name: _view(data, member) for member in members if member.name != META}
         meta = next(member for member in members if member.name == META)
-        record = json.loads(bytes(content_of(data, meta)))
-        if not isinstance(record, dict):
-            raise ValueError(f"meta.json must hold an object, found {type(record).__name__}")
-        return Clip(meta=ClipMeta.from_json(record), **arrays)
-    except (ValueError, TypeError, KeyError) as error:
+        return Clip(meta=parse_meta(content_of(data, meta)), **arrays)
+    except (ValueError, TypeError) as error:
         raise IntegrityError(f"{where}: the members must form a valid clip, but: {error}") from error
 
 

@@ -1,14 +1,13 @@
 """A clip written once, by `encode`: its share of a shard, and a sidecar that vouches for it."""
 
 import json
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from wsm_data.errors import IntegrityError
 from wsm_data.files.atomic import write_bytes, write_text
 from wsm_data.files.digest import xxh3_128
+from wsm_data.files.json_values import from_json, to_json
 from wsm_data.files.jsonlines import canonical_json
 from wsm_data.schema.clip import Clip
 from wsm_data.schema.clip_meta import ClipMeta
@@ -45,36 +44,6 @@ class FragmentInfo:
     def key(self) -> str:
         """Key of the clip."""
         return self.meta.key
-
-    def to_json(self) -> dict[str, object]:
-        """JSON object of all fields."""
-        return {
-            "fragment_version": FRAGMENT_VERSION,
-            "meta": self.meta.to_json(),
-            "size_bytes": self.size_bytes,
-            "digest": self.digest,
-            "members": [asdict(member) for member in self.members],
-            "rgb_sums": self.rgb_sums.to_json(),
-            "depth_sums": self.depth_sums.to_json(),
-        }
-
-    @classmethod
-    def from_json(cls, record: Mapping[str, Any]) -> "FragmentInfo":
-        """Inverse of `to_json`.
-
-        Raises:
-            ValueError: the sidecar has another version.
-        """
-        if record["fragment_version"] != FRAGMENT_VERSION:
-            raise ValueError(f"fragment_version must be {FRAGMENT_VERSION}, found {record['fragment_version']!r}")
-        return cls(
-            meta=ClipMeta.from_json(record["meta"]),
-            size_bytes=int(record["size_bytes"]),
-            digest=str(record["digest"]),
-            members=tuple(Member(**{**member, "shape": tuple(member["shape"])}) for member in record["members"]),
-            rgb_sums=LatentSums.from_json(record["rgb_sums"]),
-            depth_sums=LatentSums.from_json(record["depth_sums"]),
-        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,7 +94,7 @@ def write_fragment(folder: Path, fragment: Fragment) -> Path:
     sidecar = path.with_suffix(SIDECAR_SUFFIX)
     sidecar.unlink(missing_ok=True)  # an old sidecar must not vouch for new bytes, should this be killed between
     write_bytes(path, fragment.data)
-    write_text(sidecar, canonical_json(fragment.info.to_json()) + "\n")
+    write_text(sidecar, canonical_json({"fragment_version": FRAGMENT_VERSION, **to_json(fragment.info)}) + "\n")
     return path
 
 
@@ -137,8 +106,11 @@ def read_fragment_info(path: Path) -> FragmentInfo:
     """
     sidecar = path.with_suffix(SIDECAR_SUFFIX)
     try:
-        return FragmentInfo.from_json(json.loads(sidecar.read_bytes()))
+        record = dict(json.loads(sidecar.read_bytes()))
+        if (version := record.pop("fragment_version", None)) != FRAGMENT_VERSION:
+            raise ValueError(f"fragment_version must be {FRAGMENT_VERSION}, found {version!r}")
+        return from_json(FragmentInfo, record)
     except FileNotFoundError as error:
         raise IntegrityError(f"{path} has no sidecar {sidecar.name}, so it is unfinished; encode it again") from error
-    except (ValueError, TypeError, KeyError) as error:
-        raise IntegrityError(f"{sidecar} must be the sidecar of a fragment, but: {error!r}; encode it again") from error
+    except (ValueError, TypeError) as error:
+        raise IntegrityError(f"{sidecar} must be the sidecar of a fragment, but: {error}; encode it again") from error

@@ -9,13 +9,12 @@ A latent counts when at least one of the raw frames it covers is real: latents o
 padded clip would pull the statistics towards last views.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from wsm_data.schema.arrays import Float16Array, Float64Array, frozen_array
+from wsm_data.schema.arrays import Float16Array
 from wsm_data.schema.clip import Clip
 from wsm_data.schema.sequence import TEMPORAL_RATIO
 
@@ -23,36 +22,19 @@ STD_FLOOR = 1e-6
 """Least standard deviation, in latent units: a constant channel is divided by this, not by zero."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True)
 class LatentSums:
     """What has to be known of latents to merge them with others.
 
     Attributes:
         count: values per channel.
-        mean: mean per channel; float64 [C].
-        squared_deviations: sum of (x - mean)^2 per channel; float64 [C].
+        mean: mean per channel.
+        squared_deviations: sum of (x - mean)^2 per channel.
     """
 
     count: int
-    mean: Float64Array
-    squared_deviations: Float64Array
-
-    def to_json(self) -> dict[str, object]:
-        """JSON object; float64 survives it to the bit."""
-        return {
-            "count": self.count,
-            "mean": self.mean.tolist(),
-            "squared_deviations": self.squared_deviations.tolist(),
-        }
-
-    @classmethod
-    def from_json(cls, record: Mapping[str, Any]) -> "LatentSums":
-        """Inverse of `to_json`."""
-        return cls(
-            count=int(record["count"]),
-            mean=np.array(record["mean"], np.float64),
-            squared_deviations=np.array(record["squared_deviations"], np.float64),
-        )
+    mean: tuple[float, ...]
+    squared_deviations: tuple[float, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,8 +76,8 @@ def latent_sums(latent: Float16Array) -> LatentSums:
     values *= values
     return LatentSums(
         count=len(values),
-        mean=np.asarray(frozen_array(mean)),
-        squared_deviations=np.asarray(frozen_array(np.add.reduce(values, axis=0))),
+        mean=tuple(mean.tolist()),
+        squared_deviations=tuple(np.add.reduce(values, axis=0).tolist()),
     )
 
 
@@ -117,15 +99,17 @@ def latent_statistics(sums: LatentSums | None, std_floor: float = STD_FLOOR) -> 
     """Mean and population standard deviation of merged sums."""
     if sums is None:
         return LatentStatistics(count=0, mean=(), std=())
-    std = np.maximum(np.sqrt(sums.squared_deviations / sums.count), std_floor)
-    return LatentStatistics(count=sums.count, mean=tuple(sums.mean.tolist()), std=tuple(std.tolist()))
+    std = np.maximum(np.sqrt(np.array(sums.squared_deviations) / sums.count), std_floor)
+    return LatentStatistics(count=sums.count, mean=sums.mean, std=tuple(std.tolist()))
 
 
 def _merge(a: LatentSums, b: LatentSums) -> LatentSums:
     count = a.count + b.count
-    delta = b.mean - a.mean
+    mean = np.array(a.mean)
+    delta = np.array(b.mean) - mean
+    squared = np.array(a.squared_deviations) + np.array(b.squared_deviations)
     return LatentSums(
         count=count,
-        mean=a.mean + delta * (b.count / count),
-        squared_deviations=a.squared_deviations + b.squared_deviations + delta * delta * (a.count * b.count / count),
+        mean=tuple((mean + delta * (b.count / count)).tolist()),
+        squared_deviations=tuple((squared + delta * delta * (a.count * b.count / count)).tolist()),
     )

@@ -9,10 +9,11 @@ from pipelines.artifacts.episode_table import (
     read_episodes,
     record_digest,
     row_from_json,
+    row_json,
     write_episodes,
 )
 from wsm_data.errors import IntegrityError
-from wsm_data.files.jsonlines import read_lines
+from wsm_data.files.jsonlines import read_lines, write_lines
 from wsm_data.schema.camera import Intrinsics
 from wsm_data.schema.episode import EpisodeRecord
 from wsm_data.schema.identity import EpisodeId
@@ -53,6 +54,13 @@ def test_a_row_is_the_same_in_the_table_and_as_json(tmp_path):
     write_episodes(tmp_path, [row("box_zed/hall/000002")])
     (line,) = read_lines(tmp_path / EPISODES_FILE)
     assert row_from_json(line) == row("box_zed/hall/000002")
+
+
+@pytest.mark.parametrize("change", [{"frames": "7"}, {"id": "hall"}, {"floor_z_m": None}, {"colour": 1}])
+def test_a_line_that_is_no_row_is_damage(tmp_path, change):
+    write_lines(tmp_path / EPISODES_FILE, [{**row_json(row("box_zed/hall/000002")), **change}])
+    with pytest.raises(IntegrityError, match=r"must hold a trajectory a line, but: .*; run `wsm index` again"):
+        read_episodes(tmp_path)
 
 
 def test_a_source_without_a_usable_trajectory_has_an_empty_table(tmp_path):

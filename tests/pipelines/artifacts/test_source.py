@@ -1,6 +1,5 @@
 """What later stages know of the source: from the index they build on, never from a setting of their own."""
 
-import json
 from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 
@@ -8,15 +7,13 @@ import pytest
 from box_room import DATASET, MANIFEST_TOML, along_x, scene_files, write_archive, write_folder
 
 from pipelines.artifacts.layout import conventions_path
-from pipelines.artifacts.source import container_from_json, container_json, conventions_digest, indexed_source
+from pipelines.artifacts.source import conventions_digest, indexed_source
 from pipelines.running.options import RunOptions
 from pipelines.running.runner import run_stage
 from pipelines.stages.index import STAGE, IndexConfig
 from wsm_data.errors import ConfigError, IntegrityError
-from wsm_data.readers.interndata.containers import find_containers
 from wsm_data.readers.manifest import load_dataset
 from wsm_data.schema.dataset import CameraModel
-from wsm_data.schema.layout import Layout
 
 
 @pytest.fixture
@@ -32,13 +29,6 @@ def tree(tmp_path):
 
 def index(tree, out, dataset):
     run_stage(STAGE, IndexConfig(source=tree, dataset=dataset), out, RunOptions(quiet=True))
-
-
-def test_containers_of_every_layout_survive_the_ledger(tree):
-    containers = find_containers(tree, DATASET)
-    assert {one.layout for one in containers} == set(Layout)
-    for one in containers:
-        assert container_from_json(json.loads(json.dumps(container_json(one)))) == one
 
 
 def test_the_source_is_where_the_index_found_it_whatever_the_working_folder(tree, tmp_path, monkeypatch):

@@ -21,6 +21,7 @@ from wsm_data.codecs.quality import CodecQuality
 from wsm_data.codecs.registry import CodecConfig
 from wsm_data.errors import ConfigError
 from wsm_data.files.digest import sha256_file, xxh3_128
+from wsm_data.files.json_values import from_json
 from wsm_data.files.typed_toml import build_config
 from wsm_data.readers.interndata.reader import INTERNDATA
 from wsm_data.schema.identity import EpisodeId
@@ -279,7 +280,7 @@ def test_the_share_of_measured_clips_depends_on_their_ids_alone_and_grows_with_i
         mapped.run("encode", quality_share=share)
         facts = {unit: outcome.facts["quality"] for unit, outcome in mapped.outcomes("encode").items()}
         measured[share] = {unit for unit, quality in facts.items() if quality}
-        assert all(CodecQuality.from_json(facts[unit]).clips == 1 for unit in measured[share])
+        assert all(from_json(CodecQuality, facts[unit]).clips == 1 for unit in measured[share])
         shutil.rmtree(mapped.folder("encode"))
     assert measured[0.0] == set() < measured[0.5] < measured[1.0] == set(UNITS)
 

@@ -19,7 +19,6 @@ from box_room import (
 
 from pipelines.artifacts.episode_table import read_episodes
 from pipelines.artifacts.layout import records_path, surface_path
-from pipelines.artifacts.source import container_from_json
 from pipelines.operations.dry_run import show_stage
 from pipelines.running.folder import read_stage_record
 from pipelines.running.options import RunOptions
@@ -27,10 +26,12 @@ from pipelines.running.settings import settings_of
 from pipelines.stages import index
 from pipelines.stages.index import IndexConfig, count_differences
 from wsm_data.errors import ConfigError
+from wsm_data.files.json_values import from_json
 from wsm_data.files.jsonlines import read_lines
 from wsm_data.files.typed_toml import build_config
 from wsm_data.maps.voxels import load_voxels, voxels_digest
 from wsm_data.readers.record_table import read_records
+from wsm_data.readers.source import Container
 from wsm_data.schema.layout import Layout
 
 DEN, HALL_SCENE, ZED = "box_d435i/den", "box_d435i/hall", "box_zed/hall"
@@ -111,7 +112,7 @@ def test_the_facts_of_a_container_are_those_of_its_trajectories(finished):
         assert facts["trajectories"] == len(records) == {DEN: 1, HALL_SCENE: 3, ZED: 1}[name]
         assert facts["frames"] == sum(record.frame_count for record in records)
         assert [row["digest"] for row in facts["episodes"]] == [record.content_digest for record in records]
-        assert container_from_json(facts["container"]) == finished.units("index")[name].payload
+        assert from_json(Container, facts["container"]) == finished.units("index")[name].payload
         assert facts["bytes"] >= sum(
             path.stat().st_size for kind in (RGB, DEPTH) for path in (finished.source / name / kind).iterdir()
         )

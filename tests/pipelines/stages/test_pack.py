@@ -12,6 +12,7 @@ from wsm_data.clips.config import ClipConfig
 from wsm_data.codecs.quality import CodecQuality
 from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.files.digest import sha256_file
+from wsm_data.files.json_values import from_json
 from wsm_data.files.typed_toml import build_config
 from wsm_data.shards.inventory import UnitState
 
@@ -132,8 +133,8 @@ def test_the_facts_of_a_shard_are_those_of_its_file(finished):
 
 
 def test_the_quality_of_the_codec_is_that_of_all_measured_clips_together(finished):
-    quality = CodecQuality.from_json(open_release(finished.release).manifest.codec_quality)
-    single = [CodecQuality.from_json(outcome.facts["quality"]) for outcome in finished.outcomes("encode").values()]
+    quality = from_json(CodecQuality, open_release(finished.release).manifest.codec_quality)
+    single = [from_json(CodecQuality, outcome.facts["quality"]) for outcome in finished.outcomes("encode").values()]
     assert quality.clips == len(single) == 5
     assert quality.values == sum(one.values for one in single)
     assert quality.squared_error_sum == pytest.approx(sum(one.squared_error_sum for one in single), rel=1e-12)

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from wsm_data.codecs.quality import CodecQuality, DepthErrors, clip_quality, depth_error_by_range, psnr_db
+from wsm_data.files.json_values import from_json, to_json
 
 EDGES_M = (0.2, 1.0, 5.0)
 
@@ -81,7 +82,7 @@ def test_other_ranges_cannot_be_merged():
 def test_json_gives_the_same_value_back():
     depth = depth_error_by_range(np.array([0.3, 2.0]), np.array([0.4, 2.1]), np.array([True, True]), EDGES_M)
     quality = CodecQuality(clips=1, squared_error_sum=0.1 + 0.2, values=12, depth=depth)
-    assert CodecQuality.from_json(json.loads(json.dumps(quality.to_json()))) == quality
+    assert from_json(CodecQuality, json.loads(json.dumps(to_json(quality)))) == quality
 
 
 @pytest.mark.parametrize("edges_m", [(1.0,), (1.0, 1.0), (2.0, 1.0)])

@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wsm_data.files.json_values import from_json, to_json
+from wsm_data.errors import IntegrityError
+from wsm_data.files.json_values import from_json, load_json, to_json
 
 
 class Colour(StrEnum):
@@ -94,3 +95,20 @@ def test_a_field_that_is_missing_is_refused_though_it_has_a_default(name):
 def test_what_is_no_object_is_refused(record):
     with pytest.raises(ValueError, match="must be an object of Value"):
         from_json(Value, record)
+
+
+def test_a_field_with_a_default_may_be_missing_only_where_that_is_asked_for():
+    assert from_json(Point, {"x_m": 0.5}, complete=False) == Point(0.5)
+    with pytest.raises(ValueError, match='name: absent -> ""'):
+        from_json(Point, {"x_m": 0.5})
+
+
+@pytest.mark.parametrize("content", [None, "", "[]", '{"name": "a"}', '{"x_m": "a"}'])
+def test_a_file_that_is_missing_or_holds_something_else_is_damaged(tmp_path, content):
+    path = tmp_path / "point.json"
+    if content is not None:
+        path.write_text(content)
+    with pytest.raises(IntegrityError, match=r"point\.json must hold a point, but: .*; write it again"):
+        load_json(Point, path, "a point", "write it again")
+    path.write_text('{"x_m": 0.5}')
+    assert load_json(Point, path, "a point", "write it again") == Point(0.5)

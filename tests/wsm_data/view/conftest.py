@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from wsm_data.access.release import Release
+from wsm_data.files.json_values import to_json
 from wsm_data.schema.clip import Clip
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "fakes"))
@@ -56,7 +57,7 @@ def clip() -> Clip:
 
 @pytest.fixture(scope="session")
 def release(tmp_path_factory) -> Release:
-    return build_release(tmp_path_factory.mktemp("view"), UNITS, codec_quality=QUALITY.to_json())
+    return build_release(tmp_path_factory.mktemp("view"), UNITS, codec_quality=to_json(QUALITY))
 
 
 @pytest.fixture(scope="session")

@@ -1,6 +1,5 @@
 """What a clip is supervised by, read without its latents: where it starts and ends, how far that is, on which map."""
 
-import json
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +9,7 @@ from wsm_data.curation.path_outline import PATH_POINTS, path_outline
 from wsm_data.errors import IntegrityError
 from wsm_data.geometry.transform import transforms_from_vectors
 from wsm_data.schema.arrays import Float64Array
-from wsm_data.schema.clip_meta import ClipMeta
+from wsm_data.schema.clip_meta import ClipMeta, parse_meta
 from wsm_data.shards.index_row import IndexRow
 from wsm_data.shards.members import META, STORED_DTYPES
 
@@ -64,6 +63,6 @@ def read_labels(release: Release, row: IndexRow) -> ClipLabels:
 
 def _meta(data: memoryview, row: IndexRow) -> ClipMeta:
     try:
-        return ClipMeta.from_json(json.loads(bytes(data)))
-    except (ValueError, TypeError, KeyError) as error:
+        return parse_meta(data)
+    except ValueError as error:
         raise IntegrityError(f"{row.shard}, clip {row.key}: meta.json must be that of a clip, but: {error}") from error

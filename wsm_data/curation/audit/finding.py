@@ -1,9 +1,8 @@
 """What an audit finds: one thing about some clips, and how bad it is."""
 
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any
 
 
 class Severity(StrEnum):
@@ -44,10 +43,6 @@ class AuditFinding:
     severity: Severity
     clips: tuple[str, ...]
     message: str
-
-    def to_json(self) -> dict[str, Any]:
-        """JSON object of all fields."""
-        return asdict(self)
 
 
 def worst_first(findings: Iterable[AuditFinding]) -> list[AuditFinding]:

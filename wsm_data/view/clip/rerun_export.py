@@ -21,6 +21,7 @@ from wsm_data.codecs.base import VideoCodec
 from wsm_data.errors import ConfigError
 from wsm_data.files.atomic import write_bytes
 from wsm_data.files.digest import digest_json
+from wsm_data.files.json_values import to_json
 from wsm_data.geometry.transform import transforms_from_vectors
 from wsm_data.schema.arrays import Float64Array
 from wsm_data.schema.clip import Clip
@@ -58,7 +59,7 @@ def write_rerun(clip: Clip, codec: VideoCodec, path: Path) -> None:
     decoded = decode_frames(clip, codec, range(moving_frames(clip)))
     with TemporaryDirectory() as folder, _strict(rr):
         saved = Path(folder) / "clip.rrd"
-        stream = rr.RecordingStream(_APPLICATION, recording_id=digest_json(clip.meta.to_json()))
+        stream = rr.RecordingStream(_APPLICATION, recording_id=digest_json(to_json(clip.meta)))
         _require_enabled(rr, stream)
         stream.save(saved)
         stream.send_recording_name(clip.meta.key)

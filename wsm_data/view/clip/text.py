@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from wsm_data.files.json_values import to_json
 from wsm_data.schema.clip import MEMBERS, UNREACHABLE_MM, Clip
 from wsm_data.view.clip.facts import ClipFacts, clip_facts
 from wsm_data.view.drawing.text_table import aligned, bytes_text, printable
@@ -65,12 +66,12 @@ def _number(value: float | None, unit: str) -> str:
 
 def _provenance(clip: Clip) -> str:
     rows = [("provenance", "value")]
-    for name, value in clip.meta.to_json().items():
+    for name, value in to_json(clip.meta).items():
         if name == "T_world_camera0":
             rows += [(f"{name} [{row}]", "  ".join(f"{one: .6f}" for one in line)) for row, line in enumerate(value)]
         elif isinstance(value, dict):
             rows += [(f"{name}.{part}", str(one)) for part, one in value.items()]
-        elif isinstance(value, tuple):
+        elif isinstance(value, list):
             rows.append((name, ", ".join(str(one) for one in value) or "none"))
         else:
             rows.append((name, str(value)))

@@ -9,6 +9,7 @@ from markupsafe import Markup
 from wsm_data.access.release import Release
 from wsm_data.codecs.quality import CodecQuality
 from wsm_data.files.atomic import write_bytes
+from wsm_data.files.json_values import from_json
 from wsm_data.shards.manifest import release_digest
 from wsm_data.view.clip.facts import ClipFacts
 from wsm_data.view.clip.map_figures import clip_map_figure, scene_map_figure
@@ -66,7 +67,8 @@ def write_report(data: ReportData, release: Release, path: Path) -> None:
 def report_html(data: ReportData, release: Release) -> str:
     """Return the report as one HTML page. Whatever comes from a source is escaped."""
     counts = count_release(release)
-    quality = release.manifest.codec_quality
+    stated = release.manifest.codec_quality
+    quality = from_json(CodecQuality, stated) if stated else None
     with figure_style():
         return page_template(_TEMPLATE).render(
             manifest=release.manifest,
@@ -78,8 +80,8 @@ def report_html(data: ReportData, release: Release) -> str:
             distributions=[
                 _distribution(number, one) for number, one in enumerate(_distributions(data.survey, counts))
             ],
-            quality=CodecQuality.from_json(quality) if quality else None,
-            quality_svg=_quality_svg(CodecQuality.from_json(quality)) if quality else None,
+            quality=quality,
+            quality_svg=_quality_svg(quality) if quality else None,
             depth_gradient=depth_gradient(),
             map_swatches=MAP_SWATCHES,
             scene_swatches=SCENE_SWATCHES,

@@ -14,8 +14,3 @@ def test_errors_come_first_and_then_the_order_of_the_checks():
 
 def test_severities_are_ranked_from_mild_to_bad():
     assert [one.rank for one in (Severity.INFO, Severity.WARNING, Severity.ERROR)] == [0, 1, 2]
-
-
-def test_a_finding_is_a_json_object():
-    record = finding(Check.CONTENT_TWICE, Severity.ERROR, "a", "b").to_json()
-    assert record == {"check": "content.duplicate", "severity": "error", "clips": ("a", "b"), "message": "m"}
