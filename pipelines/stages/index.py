@@ -168,6 +168,10 @@ def _finish(config: IndexConfig, context: StageContext, settled: Settled) -> Fin
     return Finished(refusals=tuple(refusals), outputs=outputs)
 
 
+def _conventions(config: IndexConfig) -> DatasetManifest:
+    return load_dataset(config.dataset)
+
+
 def _finish_inputs(config: IndexConfig) -> Mapping[str, str]:
     """What the manifest says beside the conventions, its licence above all, is written down without reading again."""
     return {"manifest": digest_json(config_json(load_dataset(config.dataset)))}
@@ -212,5 +216,5 @@ STAGE = Stage(
     finish=_finish,
     parts_fact="trajectories",
     finish_inputs=_finish_inputs,
-    conventions=lambda config: load_dataset(config.dataset),
+    conventions=_conventions,
 )

@@ -1,5 +1,7 @@
 """The stages of the project."""
 
+import pickle
+
 import pytest
 
 from pipelines.registry import STAGES, load_stage
@@ -9,6 +11,12 @@ from wsm_data.errors import ConfigError
 @pytest.mark.parametrize("name", [entry.name for entry in STAGES])
 def test_a_stage_is_found_under_its_name(name):
     assert load_stage(name).name == name
+
+
+@pytest.mark.parametrize("name", [entry.name for entry in STAGES])
+def test_a_stage_travels_to_worker_processes(name):
+    stage = load_stage(name)
+    assert pickle.loads(pickle.dumps(stage)) == stage
 
 
 def test_an_unknown_stage_is_refused_with_the_nearest():
