@@ -115,6 +115,12 @@ class NumericalError(WsmError):
     exit_code = 6
 
 
+class RemotePlannerError(WsmError):
+    """A planner behind a URL is not there, or does not take a reset: its answers would be of another episode."""
+
+    exit_code = 7
+
+
 class DataError(WsmError):
     """This unit is unusable: it is quarantined under `reason`, and the run goes on.
 

@@ -5,11 +5,21 @@ import re
 
 import pytest
 
-from wsm_data.errors import BudgetExceeded, ConfigError, DataError, IntegrityError, Reason, StoreError, WsmError
+from wsm_data.errors import (
+    BudgetExceeded,
+    ConfigError,
+    DataError,
+    IntegrityError,
+    Reason,
+    RemotePlannerError,
+    StoreError,
+    WsmError,
+)
 
 
 @pytest.mark.parametrize(
-    ("kind", "code"), [(ConfigError, 2), (BudgetExceeded, 3), (IntegrityError, 4), (StoreError, 5)]
+    ("kind", "code"),
+    [(ConfigError, 2), (BudgetExceeded, 3), (IntegrityError, 4), (StoreError, 5), (RemotePlannerError, 7)],
 )
 def test_each_foreseen_failure_has_its_exit_code(kind, code):
     assert issubclass(kind, WsmError)
