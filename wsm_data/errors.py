@@ -48,6 +48,7 @@ class Reason(StrEnum):
     POSE_NOT_FINITE = "pose.not_finite"
     POSE_NOT_RIGID = "pose.not_rigid"
     POSE_JUMP = "pose.jump"
+    POSE_MOTION_DISAGREE = "pose.motion_disagree"  # poses stand still, or jump, where depth images do not
     POSE_DEPTH_DISAGREE = "pose.depth_disagree"
     INTRINSICS_MISFIT = "intrinsics.misfit"
     MOUNT_MISFIT = "mount.misfit"

@@ -36,6 +36,18 @@ MIN_POINTS = 50
 MIN_SHARE = 0.02
 """and from this share of the points that both frames see: fewer lie at edges and behind corners."""
 
+MIN_DECIDING_SHARE = 0.03
+"""Another meaning of the poses is better where so large a share of all points that are seen tells the two apart,"""
+
+MIN_DECIDING_PAIRS = 3
+"""in so many pairs, or, in fewer pairs,"""
+
+LARGE_DECIDING_SHARE = 0.1
+"""this share of the points does;"""
+
+MIN_VOTES = 2 / 3
+"""and so large a share of these pairs is for it: the error of one pose is in two pairs at most, a slip is in all."""
+
 MAX_OFFSET_FRAMES = 3
 """Poses up to so many frames earlier and later are held against the images too."""
 
@@ -74,7 +86,9 @@ def check_depth_agreement(
     meanings |= _shifted(record.T_world_camera)
     errors = {name: _against(record, poses, compared, own, max_error) for name, poses in meanings.items()}
     better = {
-        name: other for name, (mine, other) in errors.items() if mine > max_error and other <= min(max_error, mine / 2)
+        name: other
+        for name, (mine, other, share) in errors.items()
+        if mine > max_error and other <= min(max_error, mine / 2) and share > 0
     }
     measured: dict[str, object] = {"pairs": used, "median_relative_error": median}
     if not better and (median is None or median <= max_error):
@@ -85,14 +99,26 @@ def check_depth_agreement(
         if fits is not None
         else "no other meaning of the poses fits either: poses and images are of different trajectories, or out of step"
     )
-    found = f"{median:.1%} in {used} pairs of frames" if median is not None else "that another meaning fits better"
+    found = _found(median, used, errors.get(fits or ""))
     message = (
         f"{record.id.text}: depth moved along the poses must agree within {max_error:.0%}, found {found} "
         f"with poses stored as {camera_axes}; {advice}"
     )
-    tried = {name: {"own": mine, "other": other} for name, (mine, other) in errors.items() if math.isfinite(other)}
+    tried = {
+        name: {"own": mine, "other": other, "deciding_share": share}
+        for name, (mine, other, share) in errors.items()
+        if math.isfinite(other)
+    }
     details = {**measured, "errors_where_they_differ": tried, "fits": fits}
     return Verdict(reason=Reason.POSE_DEPTH_DISAGREE, message=message, measured=details)
+
+
+def _found(median: float | None, pairs: int, best: tuple[float, float, float] | None) -> str:
+    """The numbers that decided, in words."""
+    if best is not None:
+        mine, other, share = best
+        return f"{mine:.1%} over the {share:.0%} of the points that tell the two apart, and {other:.1%} otherwise,"
+    return f"{median:.1%} in {pairs} pairs of frames"
 
 
 def _meanings(T_world_stored: Float64Array) -> dict[str, Float64Array]:
@@ -140,18 +166,28 @@ def _against(
     pairs: Sequence[DepthPair],
     own: Sequence[Float64Array],
     max_error: float,
-) -> tuple[float, float]:
-    """Median errors of a record's own poses and of others, over the points that tell them apart; NaN without any."""
+) -> tuple[float, float, float]:
+    """Median errors of a record's own poses and of others, over the points that tell them apart, and their share.
+
+    NaN where these are too few, or pairs do not tell the same.
+    """
     told = []
+    seen = sum(np.count_nonzero(np.isfinite(mine)) for mine in own)
     for pair, mine in zip(pairs, own, strict=True):
         other = _errors(record, T_world_camera, pair)
         tells = _differ(mine, other, max_error)
         if _enough(tells, mine):
             told.append(np.abs([mine[tells], other[tells]]))
     if not told:
-        return math.nan, math.nan
-    mine_median, other_median = np.median(np.concatenate(told, axis=1), axis=1).tolist()
-    return mine_median, other_median
+        return math.nan, math.nan, 0.0
+    votes = np.mean([np.median(mine) > np.median(other) for mine, other in told])
+    both = np.concatenate(told, axis=1)
+    least = MIN_DECIDING_SHARE if len(told) >= MIN_DECIDING_PAIRS else LARGE_DECIDING_SHARE
+    decides = both.shape[1] >= least * seen
+    if not decides or votes < MIN_VOTES:
+        return math.nan, math.nan, 0.0
+    mine_median, other_median = np.median(both, axis=1).tolist()
+    return mine_median, other_median, both.shape[1] / seen
 
 
 def _differ(one: Float64Array, other: Float64Array, max_error: float) -> BoolArray:

@@ -1,9 +1,10 @@
 """Do the depth images of a trajectory fit its poses? Looked at in a few pairs of frames, at their stored size."""
 
 import logging
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import chain
+from itertools import chain, pairwise
 
 import numpy as np
 
@@ -28,6 +29,12 @@ TURN_M_PER_RAD = 1.0
 
 MAX_PAIRS = 7
 
+STEP_M = 0.3
+"""Way between the frames of a chain of pairs: most points of one are seen from the other."""
+
+MAX_STEPS = 24
+MAX_STEP_FRAMES = 30
+
 _ROUNDING_M = 1e-6
 """Steps of 0.1 m add up to their multiples, but for this."""
 
@@ -37,11 +44,13 @@ class DepthSamples:
     """A few depth images of a trajectory.
 
     Attributes:
-        pairs: frames that are compared.
+        pairs: frames that are compared, chosen by the way between them.
+        steps: frames that are compared, chosen by time; each but the first begins where one before it ends.
         depth_m: by frame, depth along the optical axis, m, 0 without measurement; float32 [H, W].
     """
 
     pairs: tuple[tuple[int, int], ...]
+    steps: tuple[tuple[int, int], ...] = ()
     depth_m: Mapping[int, Float32Array]
 
 
@@ -53,15 +62,16 @@ def sample_depth(record: EpisodeRecord, frames: EpisodeFrames, dataset: DatasetM
     """
     measured = {number: image for number, image in enumerate(frames.depth) if image is not None}
     pairs = tuple(spread_pairs(record, sorted(measured)))
-    depth_m = {number: _depth_m(record, number, measured[number], dataset) for number in sorted({*chain(*pairs)})}
-    return DepthSamples(pairs=pairs, depth_m=depth_m)
+    steps = tuple(chained_steps(record, sorted(measured)))
+    wanted = sorted({*chain(*pairs, *steps)})
+    depth_m = {number: _depth_m(record, number, measured[number], dataset) for number in wanted}
+    return DepthSamples(pairs=pairs, steps=steps, depth_m=depth_m)
 
 
 def check_samples(record: EpisodeRecord, samples: DepthSamples, dataset: DatasetManifest) -> Verdict:
     """Whether depth images contradict the poses (`pose.depth_disagree`), naming what would fit."""
-    return check_depth_agreement(
-        record, samples.depth_m, samples.pairs, dataset.camera_axes, dataset.checks.max_depth_error
-    )
+    pairs = sorted({*samples.pairs, *samples.steps})
+    return check_depth_agreement(record, samples.depth_m, pairs, dataset.camera_axes, dataset.checks.max_depth_error)
 
 
 def agreeing_records(
@@ -124,6 +134,22 @@ def spread_pairs(record: EpisodeRecord, numbers: Sequence[int]) -> list[tuple[in
         (numbers[a], numbers[min(b, len(numbers) - 1)]) for a, b in zip(first.tolist(), second.tolist(), strict=True)
     }
     return sorted((a, b) for a, b in pairs if a != b)
+
+
+def chained_steps(record: EpisodeRecord, numbers: Sequence[int]) -> list[tuple[int, int]]:
+    """Pairs of frames that follow one another from the first to the last, `STEP_M` apart at the mean speed.
+
+    Chosen by time and not by the poses' own motion, they see where poses stand still while images move. At most
+    `MAX_STEPS`, and no longer than `MAX_STEP_FRAMES` or half of the trajectory where that is enough.
+    """
+    if len(numbers) < 2:
+        return []
+    count = numbers[-1] - numbers[0]
+    speed_m = float(_way_m(record)[-1]) / record.frame_count
+    frames = min(MAX_STEP_FRAMES, STEP_M / speed_m if speed_m > 0 else math.inf, max(1, count // 2))
+    steps = min(MAX_STEPS, len(numbers) - 1, max(1, round(count / frames)))
+    chosen = np.rint(np.linspace(0, len(numbers) - 1, steps + 1)).astype(int).tolist()
+    return [(numbers[a], numbers[b]) for a, b in pairwise(chosen)]
 
 
 def _way_m(record: EpisodeRecord) -> Float64Array:

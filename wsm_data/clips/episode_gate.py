@@ -3,6 +3,7 @@
 import numpy as np
 
 from wsm_data.checks.cloud_agreement import check_cloud_agreement, height_bands
+from wsm_data.checks.depth_motion import check_depth_motion
 from wsm_data.checks.gate import require_kept
 from wsm_data.clips.depth_gate import DepthSamples, check_samples, sample_depth
 from wsm_data.geometry.camera import pixel_rays
@@ -28,7 +29,11 @@ def require_sound(record: EpisodeRecord, frames: EpisodeFrames, scene_map: Scene
         DataError: the first reason, with all others in the message; or a frame does not decode.
     """
     samples = sample_depth(record, frames, dataset)
-    require_kept(check_samples(record, samples, dataset), check_cloud(record, samples, scene_map, dataset))
+    require_kept(
+        check_samples(record, samples, dataset),
+        check_depth_motion(record, samples.depth_m, samples.steps, dataset.checks.max_depth_error),
+        check_cloud(record, samples, scene_map, dataset),
+    )
 
 
 def check_cloud(record: EpisodeRecord, samples: DepthSamples, scene_map: SceneMap, dataset: DatasetManifest) -> Verdict:
