@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from wsm_data.schema.arrays import Float32Array
 
@@ -29,6 +30,11 @@ class LatentStandard:
     depth_mean: tuple[float, ...]
     depth_std: tuple[float, ...]
 
+    def standard_rgb(self, latents: Float32Array) -> Float32Array:
+        """RGB latents [..., C, h, w] of the codec, standardised: to the bit what a loader delivers of a release."""
+        mean, scale = _column(self.rgb_mean), _column(1 / np.array(self.rgb_std, np.float64))
+        return (latents - mean) * scale
+
     def raw_rgb(self, latents: Float32Array) -> Float32Array:
         """Standardised RGB latents [..., C, h, w] as their codec decodes them."""
         return _raw(latents, self.rgb_mean, self.rgb_std)
@@ -39,5 +45,8 @@ class LatentStandard:
 
 
 def _raw(latents: Float32Array, mean: tuple[float, ...], std: tuple[float, ...]) -> Float32Array:
-    scale, offset = (np.array(values, np.float32)[:, None, None] for values in (std, mean))
-    return latents * scale + offset
+    return latents * _column(std) + _column(mean)
+
+
+def _column(values: ArrayLike) -> Float32Array:
+    return np.array(values, np.float32)[:, None, None]

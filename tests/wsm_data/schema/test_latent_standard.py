@@ -17,3 +17,11 @@ def test_what_was_standardised_becomes_what_it_was_channel_by_channel():
     assert standard.raw_rgb(latents)[2, :, 0, 1].tolist() == [3.0, -1.5]
     assert standard.raw_depth(latents)[0, :, 0, 0].tolist() == [4.0, 9.0]
     assert standard.raw_rgb(latents).dtype == np.float32
+
+
+def test_standardising_is_the_way_back():
+    standard = LatentStandard(
+        codec="dct", codec_digest="d", rgb_mean=(1.0,), rgb_std=(2.0,), depth_mean=(0.0,), depth_std=(1.0,)
+    )
+    assert standard.standard_rgb(np.full((1, 1, 1), 5.0, np.float32)).tolist() == [[[2.0]]]
+    assert standard.raw_rgb(np.full((1, 1, 1), 2.0, np.float32)).tolist() == [[[5.0]]]
