@@ -37,7 +37,7 @@ class _Drive:
         episode: what the model knows of it.
         noise_key: from which, with the seed, the noise of its dreams follows.
         seen_step: control step of its last frame.
-        goal_m: in the first camera's frame, float64 [3]; None before the first frame.
+        goal_m: in the first camera's frame, from the first frame on; float64 [3].
         T_camera0_camera: the camera at the last frame of the newest latent, as it is estimated; float64 [4, 4].
         issued: the poses that were answered last; what a model without SLAM takes for those of the next latent.
     """
@@ -46,7 +46,7 @@ class _Drive:
     episode: Episode
     noise_key: bytes = b""
     seen_step: int | None = None
-    goal_m: Float64Array | None = None
+    goal_m: Float64Array = field(default_factory=lambda: np.zeros(3))
     T_camera0_camera: Float64Array = field(default_factory=lambda: np.eye(4))
     issued: StateEstimate | None = None
 
@@ -61,7 +61,7 @@ class Agent:
         model: in evaluation mode, on the device that is used.
         eye: of the model's codec.
         config: settings.
-        watcher: is shown the dreams; None where nobody looks.
+        watcher: is shown the dreams; None where nobody looks. It may be changed between episodes.
     """
 
     name = "agent"
@@ -69,7 +69,7 @@ class Agent:
 
     def __init__(self, model: WorldSlamModel, eye: Eye, config: AgentConfig, watcher: Watcher | None = None):
         self._session = Session(model, config.session)
-        self._eye, self._config, self._watcher = eye, config, watcher
+        self._eye, self._config, self.watcher = eye, config, watcher
         self._schedule = flow_schedule(config.flow_steps, config.flow_shift)
         self._device = next(model.parameters()).device
         self._camera: Intrinsics | None = None
@@ -105,12 +105,12 @@ class Agent:
     def _see(self, drive: _Drive, observation: Observation) -> torch.Tensor | None:
         if observation.rgb_u8 is None or self._camera is None:
             raise ValueError("the agent needs pictures, and reset before them; declare Sense.RGB")
-        if drive.seen_step is not None and observation.step < drive.seen_step + self._config.steps_per_frame:
-            return None
-        drive.seen_step = observation.step
-        if drive.goal_m is None:
+        if drive.seen_step is None:
             drive.goal_m = goal_camera0_m(observation.goal_xy_m, drive.T_camera0_camera)
             drive.noise_key = observation.goal_xy_m.astype("<f8").tobytes()
+        elif observation.step < drive.seen_step + self._config.steps_per_frame:
+            return None
+        drive.seen_step = observation.step
         return self._eye.see(drive.video, observation.rgb_u8, self._camera)
 
     def _answers(
@@ -140,8 +140,8 @@ class Agent:
         return torch.randn(1, self._config.session.chunk_size, *latent_shape, generator=generator)
 
     def _show(self, number: int, observation: Observation, seen: torch.Tensor, dream: Dream) -> None:
-        if self._watcher is not None:
-            self._watcher(number, observation, self._eye.pictures(seen, dream.rgb[0]))
+        if self.watcher is not None:
+            self.watcher(number, observation, self._eye.pictures(seen, dream.rgb[0]))
 
     def _answer(self, drive: _Drive, dream: Dream) -> Plan:
         first = StateEstimate(first=dream.first, depth=None, poses=dream.poses[0, :1])
