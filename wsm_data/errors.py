@@ -52,6 +52,11 @@ class Reason(StrEnum):
     POSE_DEPTH_DISAGREE = "pose.depth_disagree"
     INTRINSICS_MISFIT = "intrinsics.misfit"
     MOUNT_MISFIT = "mount.misfit"
+    FLOOR_UNSEEN = "floor.unseen"  # a camera without a mount, and no floor in its depth
+
+    # recorded sequences: lists of images and poses with their times
+    SEQUENCE_UNREADABLE = "sequence.unreadable"
+    SEQUENCE_UNASSOCIATED = "sequence.unassociated"  # a note where only some images have no depth or pose
 
     # estimated trajectories that are compared with true ones
     TRAJECTORY_UNREADABLE = "trajectory.unreadable"

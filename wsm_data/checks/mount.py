@@ -7,6 +7,7 @@ from wsm_data.errors import Reason
 from wsm_data.schema.arrays import Float64Array
 from wsm_data.schema.dataset import DatasetManifest
 from wsm_data.schema.episode import EpisodeRecord
+from wsm_data.schema.source.motion import CarriedBy
 from wsm_data.schema.verdict import Verdict
 
 
@@ -19,9 +20,10 @@ def check_mount(record: EpisodeRecord, dataset: DatasetManifest) -> Verdict:
     limits = {
         "camera_height_m": (record.camera_height_m, checks.min_camera_height_m, dataset.max_camera_height_m),
         "mount_pitch_deg": (mount_pitch_deg, -checks.max_pitch_up_deg, dataset.max_pitch_deg),
-        "pitch_disagreement_deg": (disagreement_deg, 0.0, checks.max_pitch_disagreement_deg),
         "roll_deg": (float(np.abs(roll_deg).max()), 0.0, checks.max_roll_deg),
     }
+    if dataset.motion.carried_by == CarriedBy.ROBOT:  # a hand holds it otherwise in every frame
+        limits["pitch_disagreement_deg"] = (disagreement_deg, 0.0, checks.max_pitch_disagreement_deg)
     return verdict_within(limits, Reason.MOUNT_MISFIT, f"{record.id.text}: the camera does not stand as its mount says")
 
 

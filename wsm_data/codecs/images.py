@@ -5,6 +5,7 @@ import numpy as np
 import simplejpeg
 
 from wsm_data.codecs.png16 import decode_png16
+from wsm_data.codecs.png_chunks import PNG_SIGNATURE, has_right_checksums
 from wsm_data.errors import DataError, Reason
 from wsm_data.schema.arrays import Uint8Array, Uint16Array, require_array
 from wsm_data.schema.frames import DepthFrame, RgbFrame
@@ -37,7 +38,7 @@ def depth_codes(frame: DepthFrame, where: str) -> Uint16Array:
 
 
 def decode_rgb(data: bytes, where: str) -> Uint8Array:
-    """Decode a JPEG, rgb_u8 [H, W, 3].
+    """Decode a JPEG or a PNG of 8-bit colours, rgb_u8 [H, W, 3].
 
     What libjpeg warns of is refused here: a file that ends early or lost its place would otherwise come back with its
     rest in grey. A flipped bit that leaves a well-formed stream cannot be seen by any decoder.
@@ -49,10 +50,23 @@ def decode_rgb(data: bytes, where: str) -> Uint8Array:
     Raises:
         DataError: FRAME_UNDECODABLE.
     """
+    if data.startswith(PNG_SIGNATURE):
+        return _decode_colour_png(data, where)
     try:
         return simplejpeg.decode_jpeg(data, "RGB", strict=True)
     except ValueError as error:
         raise _undecodable("colour", "a complete JPEG", data, where, str(error)) from error
+
+
+def _decode_colour_png(data: bytes, where: str) -> Uint8Array:
+    """Decode a PNG after its checksums were found right, for OpenCV shows what it can of a damaged one."""
+    if not has_right_checksums(data):
+        raise _undecodable("colour", "a complete PNG", data, where, "a checksum does not fit")
+    image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    if image is None or image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3:
+        found = "the decoder gave up" if image is None else f"it holds {image.dtype} {list(image.shape)}"
+        raise _undecodable("colour", "a PNG of 8-bit red, green and blue", data, where, found)
+    return np.ascontiguousarray(image[..., ::-1])
 
 
 def decode_depth(data: bytes, where: str) -> Uint16Array:

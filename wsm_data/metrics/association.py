@@ -36,7 +36,7 @@ def associate(
     if len(stamps_b_s) < len(stamps_a_s):
         of_b, of_a = associate(stamps_b_s, stamps_a_s, max_difference_s)
         return of_a, of_b
-    nearest = _nearest(stamps_a_s, stamps_b_s) if len(stamps_a_s) else np.zeros(0, np.int64)
+    nearest = nearest_stamps(stamps_a_s, stamps_b_s) if len(stamps_a_s) else np.zeros(0, np.int64)
     near = np.flatnonzero(np.abs(stamps_b_s[nearest] - stamps_a_s) <= max_difference_s)
     if not len(near):
         raise DataError(
@@ -48,8 +48,8 @@ def associate(
     return near, nearest[near]
 
 
-def _nearest(wanted: Float64Array, stamps: Float64Array) -> NDArray[np.int64]:
-    """Index of the stamp that is nearest to each wanted one; of two the earlier."""
+def nearest_stamps(wanted: Float64Array, stamps: Float64Array) -> NDArray[np.int64]:
+    """Index of the stamp that is nearest to each wanted one; of two the earlier. Stamps rise, and there is one."""
     after = np.clip(np.searchsorted(stamps, wanted), 1, max(len(stamps) - 1, 1))
     before = after - 1
     after = np.minimum(after, len(stamps) - 1)

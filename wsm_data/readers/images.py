@@ -6,15 +6,15 @@ real downloads, at the price of reading a few bytes of each image.
 
 import struct
 
+from wsm_data.codecs.png_chunks import PNG_SIGNATURE
 from wsm_data.errors import DataError, Reason
 
 _JPEG_START, _JPEG_END = b"\xff\xd8", b"\xff\xd9"
 _JPEG_FRAME_MARKERS = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}  # SOF0..15 less DHT, JPG and DAC
 _JPEG_BARE_MARKERS = frozenset((0x01, *range(0xD0, 0xD8)))  # TEM and RSTn carry no length
-_PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _PNG_END = b"\x00\x00\x00\x00IEND\xaeB`\x82"
 _PNG_HEADER = struct.Struct(">8sI4sIIBB")  # signature, length, type; width, height, bit depth, colour type
-_PNG_GREY = 0
+_PNG_GREY, _PNG_RGB = 0, 2
 
 
 def check_jpeg(data: memoryview, where: str) -> tuple[int, int]:
@@ -49,13 +49,7 @@ def check_png16(data: memoryview, where: str) -> tuple[int, int]:
         DataError: `frame.empty`, `frame.undecodable` when it is no PNG, `frame.truncated` when its end is absent,
             `depth.not_16_bit` when it is any other kind of PNG.
     """
-    _require_start(data, _PNG_SIGNATURE, "PNG", where)
-    if data[-len(_PNG_END) :] != _PNG_END:
-        raise _truncated(where, "a PNG ends with an IEND chunk", bytes(data[-4:]))
-    if len(data) < _PNG_HEADER.size or bytes(data[12:16]) != b"IHDR":
-        message = f"{where}: a PNG starts with an IHDR chunk, and none was found; download it again"
-        raise DataError(Reason.FRAME_UNDECODABLE, message, {"bytes": len(data)})
-    *_, width, height, bits, colour = _PNG_HEADER.unpack_from(data)
+    width, height, bits, colour = _png_header(data, where)
     if (bits, colour) != (16, _PNG_GREY):
         raise DataError(
             Reason.DEPTH_NOT_16_BIT,
@@ -64,6 +58,36 @@ def check_png16(data: memoryview, where: str) -> tuple[int, int]:
             {"bits": bits, "colour_type": colour},
         )
     return width, height
+
+
+def check_rgb(data: memoryview, where: str) -> tuple[int, int]:
+    """Return (width, height) of a colour image that is whole: a JPEG, or a PNG of 8-bit red, green and blue.
+
+    Raises:
+        DataError: `frame.empty`, `frame.undecodable` when it is neither, `frame.truncated` when its end is absent.
+    """
+    if data[: len(PNG_SIGNATURE)] != PNG_SIGNATURE:
+        return check_jpeg(data, where)
+    width, height, bits, colour = _png_header(data, where)
+    if (bits, colour) != (8, _PNG_RGB):
+        raise DataError(
+            Reason.FRAME_UNDECODABLE,
+            f"{where}: a colour PNG must have 8 bits of red, green and blue, found {bits} bits of colour type {colour}",
+            {"bits": bits, "colour_type": colour},
+        )
+    return width, height
+
+
+def _png_header(data: memoryview, where: str) -> tuple[int, int, int, int]:
+    """Width, height, bits and colour type of a PNG that is whole."""
+    _require_start(data, PNG_SIGNATURE, "PNG", where)
+    if data[-len(_PNG_END) :] != _PNG_END:
+        raise _truncated(where, "a PNG ends with an IEND chunk", bytes(data[-4:]))
+    if len(data) < _PNG_HEADER.size or bytes(data[12:16]) != b"IHDR":
+        message = f"{where}: a PNG starts with an IHDR chunk, and none was found; download it again"
+        raise DataError(Reason.FRAME_UNDECODABLE, message, {"bytes": len(data)})
+    *_, width, height, bits, colour = _PNG_HEADER.unpack_from(data)
+    return width, height, bits, colour
 
 
 def _require_start(data: memoryview, start: bytes, kind: str, where: str) -> None:

@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 
 from wsm_data.schema.check_limits import CheckLimits
 from wsm_data.schema.depth import DepthEncoding
+from wsm_data.schema.source.motion import Motion
+from wsm_data.schema.source.sequence_files import SequenceFiles
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,6 +74,8 @@ class DatasetManifest:
         cameras: published camera models by camera name (the last word of a group).
         max_camera_height_m: mounts above this are taken for damage, m.
         max_pitch_deg: mounts pitched down by more are taken for damage, degrees.
+        motion: how the camera is carried, and which frames are kept.
+        files: how the files of a sequence are named, for readers of sequences.
         checks: the other limits beyond which a trajectory is refused.
         min_frames: shorter trajectories are refused.
         expected_episodes: published number of episodes by group, to compare with what is found.
@@ -88,6 +92,8 @@ class DatasetManifest:
     cameras: Mapping[str, CameraModel] = field(default_factory=dict)
     max_camera_height_m: float = 2.0
     max_pitch_deg: float = 45.0
+    motion: Motion = field(default_factory=Motion)
+    files: SequenceFiles = field(default_factory=SequenceFiles)
     checks: CheckLimits = field(default_factory=CheckLimits)
     min_frames: int = 5
     expected_episodes: Mapping[str, int] = field(default_factory=dict)

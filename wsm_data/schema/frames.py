@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from wsm_data.schema.arrays import Uint8Array, Uint16Array
 
 RgbFrame = bytes | Uint8Array
-"""A JPEG file, or its pixels, rgb_u8 [H, W, 3]."""
+"""A JPEG file or one of a PNG of 8-bit colours, or its pixels, rgb_u8 [H, W, 3]."""
 
 DepthFrame = bytes | Uint16Array
 """A 16-bit grey PNG file, or its raw codes, uint16 [H, W]; how codes become metres is the manifest's `depth`."""

@@ -1,6 +1,7 @@
 """What later stages know of the source: from the index they build on, never from a setting of their own."""
 
 from dataclasses import fields, is_dataclass, replace
+from enum import Enum
 from pathlib import Path
 
 import pytest
@@ -90,6 +91,10 @@ def changed_values(value):
 def other(old):
     """Another value of the same type."""
     match old:
+        case None:
+            return 0.5
+        case Enum():
+            return next(choice for choice in type(old) if choice is not old)
         case "opengl":
             return "opencv"
         case str():

@@ -6,6 +6,7 @@ import pytest
 from wsm_data.checks.mount import check_mount
 from wsm_data.errors import Reason
 from wsm_data.schema.check_limits import CheckLimits
+from wsm_data.schema.source.motion import CarriedBy, Motion
 
 
 @pytest.mark.parametrize("pitch_deg", [0.0, 12.0, 30.0])
@@ -36,6 +37,14 @@ def test_poses_in_the_wrong_camera_axes_are_upside_down_even_when_level(make_rec
     verdict = check_mount(make_record(pitch_deg=0.0, T_world_camera=flipped), dataset)
     assert verdict.reason is Reason.MOUNT_MISFIT
     assert verdict.measured["roll_deg"] == pytest.approx(180)
+
+
+def test_a_hand_may_pitch_as_it_likes_but_roll_only_within_the_limit(make_record, dataset):
+    held = replace(dataset, motion=Motion(carried_by=CarriedBy.HAND))
+    record = make_record(pitch_deg=10, camera_pitch_rad=np.deg2rad(20))
+    assert check_mount(record, held).keep
+    flipped = record.T_world_camera @ np.diag([1.0, -1, -1, 1])
+    assert check_mount(replace(record, T_world_camera=flipped), held).reason is Reason.MOUNT_MISFIT
 
 
 def test_a_rolled_camera_is_refused_with_its_angle(make_record, dataset):

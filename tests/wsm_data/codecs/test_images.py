@@ -50,7 +50,27 @@ def test_a_jpeg_whose_entropy_data_is_overwritten_is_refused(rgb_frames):
     assert refusal(decode_rgb, bytes(data)) is Reason.FRAME_UNDECODABLE
 
 
-def test_a_png_is_no_colour_frame(depth_frames):
+def test_a_colour_png_comes_back_to_the_bit():
+    image = np.random.default_rng(0).integers(0, 256, (9, 14, 3), dtype=np.uint8)
+    data = cv2.imencode(".png", image[..., ::-1])[1].tobytes()
+    assert np.array_equal(decode_rgb(data, WHERE), image)
+
+
+@pytest.mark.parametrize("position", [0.3, 0.6, 0.9])
+def test_a_colour_png_with_one_flipped_bit_is_refused(position):
+    image = np.random.default_rng(0).integers(0, 256, (9, 14, 3), dtype=np.uint8)
+    data = bytearray(cv2.imencode(".png", image)[1].tobytes())
+    data[int(position * len(data))] ^= 4
+    assert refusal(decode_rgb, bytes(data)) is Reason.FRAME_UNDECODABLE
+
+
+@pytest.mark.parametrize("shape", [(9, 14), (9, 14, 4)])
+def test_a_grey_png_and_one_with_transparency_are_no_colour_frames(shape):
+    data = cv2.imencode(".png", np.zeros(shape, np.uint8))[1].tobytes()
+    assert refusal(decode_rgb, data) is Reason.FRAME_UNDECODABLE
+
+
+def test_a_depth_png_is_no_colour_frame(depth_frames):
     assert refusal(decode_rgb, depth_frames[0]) is Reason.FRAME_UNDECODABLE
 
 

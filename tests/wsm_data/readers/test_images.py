@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from wsm_data.errors import DataError, Reason
-from wsm_data.readers.images import check_jpeg, check_png16
+from wsm_data.readers.images import check_jpeg, check_png16, check_rgb
 
 PIXELS = np.random.default_rng(0).integers(0, 256, (17, 33, 3), dtype=np.uint8)
 
@@ -70,3 +70,17 @@ def test_a_jpeg_without_a_frame_is_undecodable():
 
 def test_a_png_without_a_header_is_undecodable():
     assert reason_of(check_png16, PNG[1][:8] + PNG[1][-12:]) is Reason.FRAME_UNDECODABLE
+
+
+def test_a_colour_image_is_a_jpeg_or_a_png_of_eight_bit_colours():
+    assert check_rgb(encoded(".jpg", PIXELS), "a") == (33, 17)
+    assert check_rgb(encoded(".png", PIXELS), "a") == (33, 17)
+
+
+@pytest.mark.parametrize("image", [PIXELS[..., 0], PIXELS.astype(np.uint16)])
+def test_other_kinds_of_png_are_no_colour_images(image):
+    assert reason_of(check_rgb, bytes(encoded(".png", image))) is Reason.FRAME_UNDECODABLE
+
+
+def test_a_cut_colour_png_is_refused():
+    assert reason_of(check_rgb, bytes(encoded(".png", PIXELS))[:-5]) is Reason.FRAME_TRUNCATED

@@ -3,9 +3,8 @@
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from wsm_data.errors import DataError, IntegrityError
-from wsm_data.files.digest import xxh3_128
-from wsm_data.readers.interndata.record import digest_frames
+from wsm_data.errors import DataError
+from wsm_data.readers.frames_digest import source_changed, verified_frames
 from wsm_data.readers.interndata.scene_files import iter_members
 from wsm_data.readers.source import Container
 from wsm_data.readers.unreadable import read_file
@@ -44,8 +43,8 @@ def _from_folder(root: Path, records: Sequence[EpisodeRecord]) -> Iterator[tuple
             rgb = tuple(read_file(f"{root}/{name}", f"{record.container}:{name}") for name in record.rgb_members)
             depth = tuple(read_file(f"{root}/{name}", f"{record.container}:{name}") for name in record.depth_members)
         except DataError as error:
-            raise _changed(record.container, error.message) from error
-        yield record, _verified(record, rgb, depth)
+            raise source_changed(record.container, error.message) from error
+        yield record, verified_frames(record, rgb, depth)
 
 
 def _from_archive(
@@ -65,21 +64,10 @@ def _from_archive(
                 del waiting[record.id]
                 rgb = tuple(held.pop(name) for name in record.rgb_members)
                 depth = tuple(held.pop(name) for name in record.depth_members)
-                yield record, _verified(record, rgb, depth)
+                yield record, verified_frames(record, rgb, depth)
                 if not waiting:
                     return
     except DataError as error:
-        raise _changed(container.id, str(error)) from error
+        raise source_changed(container.id, str(error)) from error
     absent = sorted(id_.text for id_ in waiting)
-    raise _changed(container.id, f"images of {', '.join(absent[:3])} are gone ({len(absent)} episodes)")
-
-
-def _verified(record: EpisodeRecord, rgb: tuple[bytes, ...], depth: tuple[bytes, ...]) -> EpisodeFrames:
-    digest = digest_frames([xxh3_128(image) for image in rgb], [xxh3_128(image) for image in depth])
-    if digest != record.frames_digest:
-        raise _changed(record.container, f"the images of {record.id.text} have other bytes")
-    return EpisodeFrames(rgb=rgb, depth=depth)
-
-
-def _changed(container: str, what: str) -> IntegrityError:
-    return IntegrityError(f"{container} changed since `wsm index` read it: {what}; run `wsm index` again")
+    raise source_changed(container.id, f"images of {', '.join(absent[:3])} are gone ({len(absent)} episodes)")

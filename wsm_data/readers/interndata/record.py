@@ -1,12 +1,13 @@
 """From the facts about the files of an episode to its record: one place where units, axes and names are converted."""
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
 from wsm_data.errors import DataError, Reason
 from wsm_data.geometry.camera import T_STORED_OPENCV
+from wsm_data.readers.frames_digest import digest_frames
 from wsm_data.readers.interndata.contents import FolderContents, FrameKey, ImageFacts
 from wsm_data.readers.interndata.naming import frame_numbers, scene_offset
 from wsm_data.readers.interndata.table import EpisodeTable
@@ -93,14 +94,6 @@ def build_record(
 def _has_images(folder: FolderContents, number: int) -> bool:
     owners = {episode for episode, _ in (*folder.rgb, *folder.depth)}
     return number in owners or (None in owners and number in folder.spans)
-
-
-def digest_frames(rgb: Sequence[str], depth: Sequence[str]) -> str:
-    """Digest of an episode's images: sha256 over the xxh3_128 of each colour and depth image, in time order."""
-    digest = hashlib.sha256()
-    for colour, distance in zip(rgb, depth, strict=True):
-        digest.update(f"{colour}{distance}".encode())
-    return digest.hexdigest()
 
 
 def _content_digest(frames_digest: str, table: EpisodeTable) -> str:

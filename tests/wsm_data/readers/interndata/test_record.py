@@ -1,11 +1,9 @@
-import hashlib
-
 import numpy as np
 import pytest
 
 from wsm_data.errors import DataError, Reason
 from wsm_data.readers.interndata.contents import FolderContents, ImageFacts
-from wsm_data.readers.interndata.record import build_record, digest_frames, episode_numbers
+from wsm_data.readers.interndata.record import build_record, episode_numbers
 from wsm_data.readers.interndata.table import EpisodeTable
 from wsm_data.schema.dataset import DatasetManifest
 from wsm_data.schema.depth import DepthEncoding
@@ -41,11 +39,6 @@ def test_pitch_and_height_are_read_from_the_mount_of_the_source(pitch_deg):
         assert record.floor_z_m == 0.0
         forward = record.T_world_camera[0, :3, 2]
         assert forward == pytest.approx([0, np.cos(np.deg2rad(pitch_deg)), -np.sin(np.deg2rad(pitch_deg))], abs=1e-12)
-
-
-def test_the_digest_of_frames_goes_by_time_and_tells_colour_from_depth():
-    assert digest_frames(["a", "b"], ["c", "d"]) == hashlib.sha256(b"acbd").hexdigest()
-    assert digest_frames(["a", "b"], ["c", "d"]) != digest_frames(["b", "a"], ["c", "d"])
 
 
 def test_images_of_an_episode_without_a_table_make_it_known():
