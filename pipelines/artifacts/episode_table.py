@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from pipelines.running.upstream import vouched_by_record
 from wsm_data.errors import IntegrityError
 from wsm_data.files.json_values import from_json, to_json
 from wsm_data.files.jsonlines import canonical_json, read_lines, write_lines
@@ -66,9 +67,9 @@ def read_episodes(folder: Path) -> list[EpisodeRow]:
     """All accepted trajectories, sorted by id.
 
     Raises:
-        IntegrityError: the table is gone although the stage says that it is done, or a line of it is no such row.
+        IntegrityError: the table is not what the stage left, or a line of it is no such row.
     """
-    path = folder / EPISODES_FILE
+    path = vouched_by_record(folder, EPISODES_FILE)
     if not path.exists():
         raise IntegrityError(f"{path} is missing; run `wsm index` again")
     try:

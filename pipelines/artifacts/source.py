@@ -6,7 +6,7 @@ from pathlib import Path
 
 from pipelines.artifacts.layout import conventions_path
 from pipelines.running.settings import config_json
-from pipelines.running.upstream import require_stage
+from pipelines.running.upstream import require_stage, vouched_by_record
 from wsm_data.files.atomic import write_text
 from wsm_data.files.digest import digest_json
 from wsm_data.files.json_values import load_json
@@ -42,10 +42,10 @@ def indexed_source(index: Path) -> IndexedSource:
 
     Raises:
         ConfigError: the folder is not a finished index.
-        IntegrityError: the conventions are gone although the stage says that it is done, or cannot be read.
+        IntegrityError: the conventions are not what the stage left.
     """
     config = require_stage(index, "index").config
-    path = conventions_path(index)
+    path = vouched_by_record(index, str(conventions_path(index).relative_to(index)))
     dataset = load_json(DatasetManifest, path, "the conventions of the source", "run `wsm index` again")
     return IndexedSource(root=Path(config["source"]), dataset=dataset)
 

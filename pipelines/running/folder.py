@@ -16,6 +16,7 @@ from typing import Any, TextIO
 from pipelines.running.stage import Outcome
 from wsm_data.errors import ConfigError, IntegrityError, Reason
 from wsm_data.files.atomic import is_full_disk, write_text
+from wsm_data.files.digest import xxh3_128, xxh3_128_file
 from wsm_data.files.journal import JournalWriter, journal_files, read_journal, rewrite_journal
 from wsm_data.files.jsonlines import canonical_json, read_lines, write_lines
 from wsm_data.schema.verdict import Refusal
@@ -23,6 +24,9 @@ from wsm_data.schema.verdict import Refusal
 STAGE_FILE, LEDGER = "stage.json", "ledger"
 QUARANTINE_FILE, PENDING_FILE = "quarantine.jsonl", "pending.jsonl"
 _SYNC_EVERY_S = 0.2
+_SEAL = "xxh3"
+_CLOCK_STEP_S = 0.001
+"""Times are kept in milliseconds; a file is never younger than the line that speaks of it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,12 +37,14 @@ class LedgerEntry:
         key: key it was settled under.
         outcome: what became of it.
         sizes: bytes of its outputs when it was settled, in their order; None for what was no file.
+        time_s: when it was settled, seconds since 1970.
         stale: the unit is pending by now, or not listed for the time being; its outputs are kept for when it returns.
     """
 
     key: str
     outcome: Outcome
     sizes: tuple[int | None, ...] = ()
+    time_s: float = 0.0
     stale: bool = False
 
 
@@ -57,7 +63,8 @@ class StageRecord:
         units: number of units in the listing.
         workers: worker processes of the last run.
         finished: digest of the outcomes `finish` was last called with; empty before.
-        outputs: size in bytes of every file that `finish` wrote, by its name relative to the folder.
+        outputs: xxh3_128 of every file that `finish` and the runner wrote at the end, by its name relative to the
+            folder; None for a folder.
     """
 
     name: str
@@ -70,7 +77,7 @@ class StageRecord:
     units: int = 0
     workers: int = 1
     finished: str = ""
-    outputs: Mapping[str, int | None] = field(default_factory=dict)
+    outputs: Mapping[str, str | None] = field(default_factory=dict)
 
 
 def read_stage_record(folder: Path) -> StageRecord | None:
@@ -83,8 +90,12 @@ def read_stage_record(folder: Path) -> StageRecord | None:
     if not path.exists():
         return None
     try:
-        return StageRecord(**json.loads(path.read_text()))
-    except (ValueError, TypeError) as error:
+        fields = json.loads(path.read_text())
+        seal = fields.pop(_SEAL)
+        if seal != _seal_of(fields):
+            raise ValueError("it was changed since it was written")
+        return StageRecord(**fields)
+    except (ValueError, TypeError, KeyError, AttributeError) as error:
         raise IntegrityError(
             f"{path} is not a stage record ({error}); delete the folder and run the stage again"
         ) from error
@@ -92,7 +103,12 @@ def read_stage_record(folder: Path) -> StageRecord | None:
 
 def write_stage_record(folder: Path, record: StageRecord) -> None:
     """Write stage.json atomically."""
-    write_text(folder / STAGE_FILE, json.dumps(vars(record), indent=2, sort_keys=True) + "\n")
+    sealed = {**vars(record), _SEAL: _seal_of(vars(record))}
+    write_text(folder / STAGE_FILE, json.dumps(sealed, indent=2, sort_keys=True) + "\n")
+
+
+def _seal_of(fields: Mapping[str, Any]) -> str:
+    return xxh3_128(canonical_json(fields).encode())
 
 
 def read_ledger(folder: Path, *, with_stale: bool = False) -> dict[str, LedgerEntry]:
@@ -110,9 +126,33 @@ def size_on_disk(path: Path) -> int | None:
     return path.stat().st_size if path.is_file() else None
 
 
-def is_as_written(path: Path, size: int | None) -> bool:
-    """Whether an output is still there, with its size where that is known."""
-    return path.exists() if size is None else size_on_disk(path) == size
+def digest_on_disk(path: Path) -> str | None:
+    """xxh3_128 of a file; None for a folder and for what is not there."""
+    return xxh3_128_file(path) if path.is_file() else None
+
+
+def is_as_written(path: Path, digest: str | None) -> bool:
+    """Whether an output is still there, with its bytes where their digest is known."""
+    return path.exists() if digest is None else digest_on_disk(path) == digest
+
+
+def is_whole(folder: Path, entry: LedgerEntry) -> bool:
+    """Whether the outputs of a unit are as it left them.
+
+    Bytes are compared of files alone that were touched since: a stage may hold terabytes, which are not read to find
+    that there is nothing to do. What a disk changes behind the system's back is found by who reads it.
+    """
+    outputs = entry.outcome.outputs
+    unknown = (None,) * len(outputs)
+    whole = zip(outputs, entry.sizes or unknown, entry.outcome.digests or unknown, strict=True)
+    return all(_is_output(folder / output, size, digest, entry.time_s) for output, size, digest in whole)
+
+
+def _is_output(path: Path, size: int | None, digest: str | None, time_s: float) -> bool:
+    if size is None or not path.is_file():
+        return size is None and path.exists()
+    found = path.stat()
+    return found.st_size == size and (digest is None or found.st_ctime <= time_s or digest_on_disk(path) == digest)
 
 
 @contextmanager
@@ -126,7 +166,7 @@ def ledger_appender(folder: Path) -> Iterator[Callable[[LedgerEntry], LedgerEntr
 
         def append(entry: LedgerEntry) -> LedgerEntry:
             sizes = [size_on_disk(folder / output) for output in entry.outcome.outputs]
-            line = {**_ledger_line(entry), "sizes": sizes, "time": round(time.time(), 3)}
+            line = {**_ledger_line(entry), "sizes": sizes, "time": round(time.time() + _CLOCK_STEP_S, 3)}
             journal.append(line)
             return _entry_from_line(folder, json.loads(canonical_json(line)))
 
@@ -182,6 +222,7 @@ def _ledger_line(entry: LedgerEntry) -> dict[str, Any]:
         "facts": dict(outcome.facts),
         "refusals": [refusal_json(refusal) for refusal in outcome.refusals],
         "seconds": round(outcome.seconds, 4),
+        "digests": list(outcome.digests),
     }
 
 
@@ -248,6 +289,8 @@ def _entry_from_line(folder: Path, line: Mapping[str, Any]) -> LedgerEntry:
         facts=line["facts"],
         refusals=tuple(refusal_from_json(record) for record in line["refusals"]),
         seconds=line["seconds"],
+        digests=tuple(line.get("digests", ())),
     )
     sizes = tuple(line.get("sizes", ()))
-    return LedgerEntry(key=line["key"], outcome=outcome, sizes=sizes, stale=line.get("stale", False))
+    time_s = line.get("time", 0.0)
+    return LedgerEntry(key=line["key"], outcome=outcome, sizes=sizes, time_s=time_s, stale=line.get("stale", False))

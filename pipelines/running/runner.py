@@ -22,12 +22,13 @@ from pipelines.running.folder import (
     LedgerEntry,
     StageRecord,
     compact_ledger,
+    digest_on_disk,
     is_as_written,
+    is_whole,
     ledger_appender,
     locked,
     read_ledger,
     read_stage_record,
-    size_on_disk,
     write_quarantine,
     write_stage_record,
 )
@@ -171,13 +172,7 @@ def _record(
 
 def _standing(out: Path) -> dict[str, LedgerEntry]:
     """The last word on every unit whose outputs are as it left them; one whose outputs are not is pending again."""
-    return {unit: entry for unit, entry in read_ledger(out, with_stale=True).items() if _is_whole(out, entry)}
-
-
-def _is_whole(out: Path, entry: LedgerEntry) -> bool:
-    outputs = entry.outcome.outputs
-    sizes = entry.sizes or (None,) * len(outputs)
-    return all(is_as_written(out / output, size) for output, size in zip(outputs, sizes, strict=True))
+    return {unit: entry for unit, entry in read_ledger(out, with_stale=True).items() if is_whole(out, entry)}
 
 
 def _selected(job: _Job[ConfigT]) -> list[Unit]:
@@ -255,7 +250,8 @@ def _process_batch(
             for outcome in stage.process(batch, config, context):
                 if left.pop(outcome.unit, None) is None:
                     raise RuntimeError(f"{stage.name} gave an outcome too many, for {outcome.unit}")
-                yield replace(outcome, seconds=time.perf_counter() - started)
+                digests = tuple(digest_on_disk(context.out / output) for output in outcome.outputs)
+                yield replace(outcome, digests=digests, seconds=time.perf_counter() - started)
                 started = time.perf_counter()
     except DataError as error:
         for unit in left.values():
@@ -270,8 +266,7 @@ def _is_finished(job: _Job[ConfigT]) -> bool:
     old = read_stage_record(job.out)
     if old is None or old.finished != _state(job):
         return False
-    written = {PENDING_FILE: None, QUARANTINE_FILE: None, **old.outputs}
-    return all(is_as_written(job.out / output, size) for output, size in written.items())
+    return all(is_as_written(job.out / output, digest) for output, digest in old.outputs.items())
 
 
 def _keep_record_current(job: _Job[ConfigT]) -> None:
@@ -308,7 +303,7 @@ def _finish(job: _Job[ConfigT]) -> None:
     _write_refusals(job, end.refusals)
     compact_ledger(job.out, {unit: job.ledger[unit] for unit in settled.outcomes}, _stale(job))
     write_lines(job.out / PENDING_FILE, [{"unit": unit} for unit in settled.pending])
-    outputs = {output: size_on_disk(job.out / output) for output in end.outputs}
+    outputs = {output: digest_on_disk(job.out / output) for output in (PENDING_FILE, QUARANTINE_FILE, *end.outputs)}
     write_stage_record(job.out, replace(job.record, finished=_state(job), outputs=outputs))
 
 

@@ -45,7 +45,9 @@ class Outcome:
             size.
         facts: JSON values worth keeping in the ledger.
         refusals: what was refused: the unit itself, or parts of a unit that is done (episodes of a container).
-        seconds: time the unit took.
+        seconds: time the unit took; the runner sets it.
+        digests: xxh3_128 of each output, in their order, None for a folder; the runner takes them where the unit was
+            done. By them a later stage knows what it reads.
     """
 
     unit: str
@@ -55,6 +57,7 @@ class Outcome:
     facts: Mapping[str, Any] = field(default_factory=dict)
     refusals: tuple[Refusal, ...] = ()
     seconds: float = 0.0
+    digests: tuple[str | None, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,15 +7,18 @@ from pipelines.running.folder import (
     PENDING_FILE,
     QUARANTINE_FILE,
     StageRecord,
+    digest_on_disk,
     read_ledger,
     read_stage_record,
     refusal_from_json,
 )
 from pipelines.running.settings import input_fields
 from pipelines.running.stage import DONE, Outcome
-from wsm_data.errors import ConfigError
+from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.files.jsonlines import read_lines
 from wsm_data.schema.verdict import Refusal
+
+DAMAGED_SUFFIX = ".damaged"
 
 
 class UpstreamMissing(ConfigError):
@@ -60,9 +63,53 @@ def done_outcomes(folder: Path) -> Mapping[str, Outcome]:
 
 def quarantine_of(folder: Path) -> tuple[Refusal, ...]:
     """Every refusal an upstream stage wrote down."""
-    return tuple(refusal_from_json(line) for line in read_lines(folder / QUARANTINE_FILE))
+    return tuple(refusal_from_json(line) for line in read_lines(vouched_by_record(folder, QUARANTINE_FILE)))
 
 
 def pending_units(folder: Path) -> tuple[str, ...]:
     """Ids of the units that an upstream stage was not asked to work on, or did not come to."""
-    return tuple(str(line["unit"]) for line in read_lines(folder / PENDING_FILE))
+    return tuple(str(line["unit"]) for line in read_lines(vouched_by_record(folder, PENDING_FILE)))
+
+
+def vouched_by_record(folder: Path, output: str) -> Path:
+    """A file that a stage wrote at its end, where it is as that stage left it.
+
+    Raises:
+        IntegrityError: it is not; what is there is set aside, so that the stage writes it again.
+    """
+    record = read_stage_record(folder)
+    if record is not None and record.finished and output in record.outputs:
+        _require_digest(folder, folder / output, record.outputs[output])
+    return folder / output
+
+
+def vouched_by_ledger(folder: Path, outcome: Outcome, path: Path) -> Path:
+    """A file that a unit of a stage before wrote, where it is as that unit left it.
+
+    Raises:
+        IntegrityError: it is not; what is there is set aside, so that the unit is done again.
+    """
+    digests = dict(zip(outcome.outputs, outcome.digests, strict=False))
+    _require_digest(folder, path, digests.get(str(path.relative_to(folder))))
+    return path
+
+
+def _require_digest(folder: Path, path: Path, digest: str | None) -> None:
+    if digest is None or digest_on_disk(path) == digest:
+        return
+    record = read_stage_record(folder)
+    stage = record.name if record else folder.name
+    found = f"other bytes, which are kept as {_set_aside(path)}" if path.exists() else "nothing"
+    raise IntegrityError(
+        f"{path} must hold what `wsm {stage}` wrote, found {found}; run the same commands again from `wsm {stage}` on: "
+        "what is missing is made again"
+    )
+
+
+def _set_aside(path: Path) -> str:
+    aside = path.with_name(f"{path.name}{DAMAGED_SUFFIX}")
+    try:
+        path.replace(aside)
+    except OSError:  # a folder that may not be written: nothing is lost
+        return path.name
+    return aside.name

@@ -11,7 +11,7 @@ from pipelines.artifacts.episode_table import read_episodes
 from pipelines.artifacts.layout import clips_folder, codec_path, map_path, records_path
 from pipelines.artifacts.source import IndexedSource, conventions_digest, indexed_source
 from pipelines.running.stage import Finished, Outcome, Settled, Stage, StageContext, Unit, refused
-from pipelines.running.upstream import done_outcomes, quarantine_of, require_stage
+from pipelines.running.upstream import done_outcomes, quarantine_of, require_stage, vouched_by_ledger
 from wsm_data.clips.build import ClipVideos, Provenance, build_clip, measure_quality, read_videos
 from wsm_data.clips.config import ClipConfig
 from wsm_data.clips.episode_gate import require_sound
@@ -62,7 +62,13 @@ class _SceneInput:
     """What the worker of one container needs beside the container; it pickles."""
 
     container: Container
-    map_from: str
+    indexed: Outcome
+    mapped: Outcome
+
+    @property
+    def map_from(self) -> str:
+        """What the map was made of."""
+        return "depth" if self.mapped.facts["fused_from_depth"] else "cloud"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,10 +96,10 @@ def _list_units(config: EncodeConfig) -> Sequence[Unit]:
             scene: _SceneInput | Refusal = without
             map_digest = f"refused {without.reason}"
         elif row.container in maps:
-            mapped = maps[row.container].facts
-            container = from_json(Container, containers[row.container].facts["container"])
-            scene = _SceneInput(container=container, map_from="depth" if mapped["fused_from_depth"] else "cloud")
-            map_digest = level_digest(mapped, row.floor_z_m)
+            indexed, mapped = containers[row.container], maps[row.container]
+            container = from_json(Container, indexed.facts["container"])
+            scene = _SceneInput(container=container, indexed=indexed, mapped=mapped)
+            map_digest = level_digest(mapped.facts, row.floor_z_m)
         else:
             continue  # its map is pending, and so is the trajectory
         inputs = {
@@ -121,7 +127,8 @@ def _process(batch: Sequence[Unit], config: EncodeConfig, context: StageContext)
         return
     source = indexed_source(config.index)
     codec = _loaded_codec(config.codec, batch[0].inputs["codec"])
-    scene_map = load_scene_map(map_path(config.map, scene.container.id))
+    map_file = map_path(config.map, scene.container.id)
+    scene_map = load_scene_map(vouched_by_ledger(config.map, scene.mapped, map_file))
     waiting: list[_Prepared] = []
     for prepared in _prepare(batch, scene, source, scene_map, config):
         if isinstance(prepared, Outcome):
@@ -154,7 +161,8 @@ def _prepare(
 ) -> Iterator[_Prepared | Outcome]:
     """Read the trajectories of one container in one pass, on the map and as videos; the unusable come as outcomes."""
     units = {unit.id: unit for unit in batch}
-    records = [one for one in read_records(records_path(config.index, scene.container.id)) if one.id.text in units]
+    table = vouched_by_ledger(config.index, scene.indexed, records_path(config.index, scene.container.id))
+    records = [one for one in read_records(table) if one.id.text in units]
     # One clip at a time is encoded before the next is read; several at a time need memory each.
     memory = _video_memory() if config.codec.batch_clips == 1 else None
     for record, frames in source.reader.iter_frames(source.root, scene.container, source.dataset, records):

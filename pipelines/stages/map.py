@@ -10,7 +10,7 @@ from pipelines.artifacts.layout import map_path, surface_path
 from pipelines.artifacts.source import conventions_digest, indexed_source
 from pipelines.running.folder import refusal_from_json
 from pipelines.running.stage import Outcome, Stage, StageContext, Unit, refused
-from pipelines.running.upstream import done_outcomes
+from pipelines.running.upstream import done_outcomes, vouched_by_ledger
 from wsm_data.errors import DataError, Reason
 from wsm_data.files.digest import digest_json
 from wsm_data.files.typed_toml import INPUT
@@ -50,7 +50,7 @@ def _list_units(config: MapConfig) -> Sequence[Unit]:
                 "floors": digest_json(_floors(outcome.facts)),
                 "dataset": conventions,
             },
-            payload=outcome.facts,
+            payload=outcome,
         )
         for container, outcome in done_outcomes(config.index).items()
         if outcome.facts["episodes"]
@@ -66,10 +66,11 @@ def _process(batch: Sequence[Unit], config: MapConfig, context: StageContext) ->
 
 
 def _map_scene(unit: Unit, config: MapConfig, out: Path) -> Outcome:
-    if unit.payload["cloud_refusal"] is not None:
-        refusal = refusal_from_json(unit.payload["cloud_refusal"])
+    facts = unit.payload.facts
+    if facts["cloud_refusal"] is not None:
+        refusal = refusal_from_json(facts["cloud_refusal"])
         raise DataError(refusal.reason, refusal.message, refusal.details)
-    voxels = load_voxels(surface_path(config.index, unit.id))
+    voxels = load_voxels(vouched_by_ledger(config.index, unit.payload, surface_path(config.index, unit.id)))
     if voxels.origin == "depth" and config.without_cloud is WithoutCloud.REFUSE:
         raise DataError(
             Reason.CLOUD_MISSING,
@@ -77,16 +78,18 @@ def _map_scene(unit: Unit, config: MapConfig, out: Path) -> Outcome:
             "without_cloud = fuse",
         )
     dataset = indexed_source(config.index).dataset
-    scene_map = build_scene_map(voxels, _floors(unit.payload), dataset.robot, dataset.max_camera_height_m)
+    scene_map = build_scene_map(voxels, _floors(facts), dataset.robot, dataset.max_camera_height_m)
     path = map_path(out, unit.id)
     path.parent.mkdir(parents=True, exist_ok=True)
     save_scene_map(path, scene_map)
-    facts = {
+    measured = {
         "floors": len(scene_map.levels),
         "fused_from_depth": int(voxels.origin == "depth"),
         "levels": [[level.floor_z_m, scene_map_digest(scene_map, level.floor_z_m)] for level in scene_map.levels],
     }
-    return Outcome(unit=unit.id, digest=scene_map_digest(scene_map), outputs=(str(path.relative_to(out)),), facts=facts)
+    return Outcome(
+        unit=unit.id, digest=scene_map_digest(scene_map), outputs=(str(path.relative_to(out)),), facts=measured
+    )
 
 
 def _floors(facts: Mapping[str, Any]) -> tuple[float, ...]:

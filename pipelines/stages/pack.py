@@ -1,7 +1,7 @@
 """`wsm pack`: clips into shards, shards into a release."""
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
@@ -10,7 +10,15 @@ from pipelines.artifacts.layout import clips_folder, codec_path, release_folder
 from pipelines.artifacts.source import indexed_source
 from pipelines.artifacts.split_table import read_split
 from pipelines.running.stage import Finished, Outcome, Settled, Stage, StageContext, Unit
-from pipelines.running.upstream import UpstreamMissing, done_outcomes, pending_units, quarantine_of, require_stage
+from pipelines.running.upstream import (
+    UpstreamMissing,
+    done_outcomes,
+    pending_units,
+    quarantine_of,
+    require_stage,
+    vouched_by_ledger,
+    vouched_by_record,
+)
 from wsm_data.clips.config import ClipConfig
 from wsm_data.codecs.quality import CodecQuality
 from wsm_data.files.digest import digest_json
@@ -19,7 +27,7 @@ from wsm_data.files.typed_toml import INPUT, SELECTION, build_config
 from wsm_data.schema.codec import CodecInfo
 from wsm_data.schema.identity import EpisodeId
 from wsm_data.shards.assemble import ReleaseFacts, finish_release
-from wsm_data.shards.fragment import fragment_path, read_fragment_info
+from wsm_data.shards.fragment import SIDECAR_SUFFIX, FragmentInfo, fragment_path, read_fragment_info
 from wsm_data.shards.manifest import ShardInfo
 from wsm_data.shards.names import INDEX_NAME, INVENTORY_NAME, MANIFEST_NAME, QUARANTINE_NAME
 from wsm_data.shards.shard_layout import PlacedClip, ShardLayout, lay_out_shards
@@ -112,13 +120,28 @@ def _require_complete(config: PackConfig) -> None:
 
 
 def _process(batch: Sequence[Unit], config: PackConfig, context: StageContext) -> Iterator[Outcome]:
-    release, clips = release_folder(context.out), clips_folder(config.encode)
+    release = release_folder(context.out)
+    path_of = _fragment_paths(config)
     for unit in batch:
         layout: ShardLayout = unit.payload
         path = release / layout.name
-        shard = write_shard(path, layout, lambda key: fragment_path(clips, key))
+        shard = write_shard(path, layout, path_of)
         facts = {"clips": shard.clips, "bytes": shard.bytes, "shard": asdict(shard)}
         yield Outcome(unit=unit.id, digest=shard.sha256, outputs=(str(path.relative_to(context.out)),), facts=facts)
+
+
+def _fragment_paths(config: PackConfig) -> Callable[[str], Path]:
+    """Finds the fragment of a clip by its key, and holds it and its sidecar against what `encode` wrote."""
+    folder = clips_folder(config.encode)
+    outcomes = {EpisodeId.parse(name).key: outcome for name, outcome in done_outcomes(config.encode).items()}
+
+    def path_of(key: str) -> Path:
+        path = fragment_path(folder, key)
+        for file in (path, path.with_suffix(SIDECAR_SUFFIX)):
+            vouched_by_ledger(config.encode, outcomes[key], file)
+        return path
+
+    return path_of
 
 
 def _finish(config: PackConfig, context: StageContext, settled: Settled) -> Finished:
@@ -127,7 +150,7 @@ def _finish(config: PackConfig, context: StageContext, settled: Settled) -> Fini
         return Finished()
     layouts = [unit.payload for unit in _list_units(config)]
     clips = _clips(config)
-    folder = clips_folder(config.encode)
+    sidecar_of = _sidecars(config, clips)
     digests = {name: outcome.facts["source_digest"] for name, outcome in clips.items()}
     account = account_of(config.index, config.encode, read_split(config.split), digests)
     finish_release(
@@ -135,7 +158,7 @@ def _finish(config: PackConfig, context: StageContext, settled: Settled) -> Fini
         _facts(config, clips),
         layouts=layouts,
         shards=[ShardInfo(**settled.outcomes[layout.name].facts["shard"]) for layout in layouts],
-        read_info=lambda key: read_fragment_info(fragment_path(folder, key)),
+        read_info=sidecar_of,
         inventory=account.rows,
         refusals=account.quarantine,
     )
@@ -144,15 +167,27 @@ def _finish(config: PackConfig, context: StageContext, settled: Settled) -> Fini
     return Finished(outputs=tuple(str(release / name) for name in written))
 
 
+def _sidecars(config: PackConfig, clips: Mapping[str, Outcome]) -> Callable[[str], FragmentInfo]:
+    """Reads the sidecar of a clip by its key, where it is as `encode` wrote it; its fragment is not read."""
+    folder = clips_folder(config.encode)
+    outcomes = {EpisodeId.parse(name).key: outcome for name, outcome in clips.items()}
+
+    def read(key: str) -> FragmentInfo:
+        path = fragment_path(folder, key)
+        vouched_by_ledger(config.encode, outcomes[key], path.with_suffix(SIDECAR_SUFFIX))
+        return read_fragment_info(path)
+
+    return read
+
+
 def _facts(config: PackConfig, clips: Mapping[str, Outcome]) -> ReleaseFacts:
     records = {name: require_stage(getattr(config, name), name) for name in ("index", "split", "map", "encode")}
+    codec_file = vouched_by_record(config.encode, str(codec_path(config.encode).relative_to(config.encode)))
     clip = build_config(ClipConfig, records["encode"].settings["clip"])
     dataset = indexed_source(config.index).dataset
     return ReleaseFacts(
         name=config.name,
-        codec=load_json(
-            CodecInfo, codec_path(config.encode), "what the codec says of itself", "run `wsm encode` again"
-        ),
+        codec=load_json(CodecInfo, codec_file, "what the codec says of itself", "run `wsm encode` again"),
         depth_range=clip.depth_range,
         encoded_width_px=clip.width,
         encoded_height_px=clip.height,

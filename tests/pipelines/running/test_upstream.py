@@ -9,8 +9,17 @@ from fake_stages import COPY, JOIN, JoinConfig
 from pipelines.running.folder import read_ledger, read_stage_record
 from pipelines.running.runner import run_stage
 from pipelines.running.stage import Finished
-from pipelines.running.upstream import done_outcomes, pending_units, quarantine_of, require_stage, upstream_records
-from wsm_data.errors import ConfigError, Reason
+from pipelines.running.upstream import (
+    DAMAGED_SUFFIX,
+    done_outcomes,
+    pending_units,
+    quarantine_of,
+    require_stage,
+    upstream_records,
+    vouched_by_ledger,
+    vouched_by_record,
+)
+from wsm_data.errors import ConfigError, IntegrityError, Reason
 
 
 @pytest.fixture
@@ -141,3 +150,52 @@ def test_only_inputs_that_a_stage_has_written_have_a_record(config, out):
     run_stage(COPY, config, out, ANY)
     assert upstream_records(config) == {}
     assert upstream_records(JoinConfig(copy=out)) == {"copy": read_stage_record(out)}
+
+
+def damage(path):
+    path.write_bytes(path.read_bytes()[::-1])
+
+
+def test_what_a_unit_wrote_is_vouched_for_by_its_ledger_and_made_again_where_it_is_not(config, out):
+    run_stage(COPY, config, out, ANY)
+    outcome = done_outcomes(out)["a1"]
+    path = out / outcome.outputs[0]
+    before = path.read_bytes()
+    assert vouched_by_ledger(out, outcome, path) == path
+    damage(path)
+    with pytest.raises(IntegrityError, match=r"must hold what `wsm copy` wrote, found other bytes, which are kept as"):
+        vouched_by_ledger(out, outcome, path)
+    assert path.with_name(path.name + DAMAGED_SUFFIX).read_bytes() == before[::-1]
+    assert run_stage(COPY, config, out, ANY).ran == ("a1",)
+    assert path.read_bytes() == before
+
+
+def test_a_file_of_the_same_size_that_was_touched_and_changed_is_made_again_by_the_same_command(config, out):
+    run_stage(COPY, config, out, ANY)
+    path = out / done_outcomes(out)["a1"].outputs[0]
+    before = path.read_bytes()
+    path.touch()
+    assert run_stage(COPY, config, out, ANY).ran == ()
+    damage(path)
+    assert run_stage(COPY, config, out, ANY).ran == ("a1",)
+    assert path.read_bytes() == before
+
+
+def test_what_a_stage_wrote_at_its_end_is_vouched_for_by_its_record(config, out):
+    run_stage(COPY, config, out, ANY)
+    assert vouched_by_record(out, "words.json") == out / "words.json"
+    damage(out / "words.json")
+    with pytest.raises(IntegrityError, match=r"words\.json must hold what `wsm copy` wrote, found other bytes"):
+        vouched_by_record(out, "words.json")
+    with pytest.raises(IntegrityError, match="found nothing"):
+        vouched_by_record(out, "words.json")
+    run_stage(COPY, config, out, ANY)
+    assert vouched_by_record(out, "words.json").is_file()
+
+
+def test_a_record_that_was_changed_is_refused(config, out):
+    run_stage(COPY, config, out, ANY)
+    record = out / "stage.json"
+    record.write_text(record.read_text().replace('"workers": 1', '"workers": 2'))
+    with pytest.raises(IntegrityError, match="it was changed since it was written"):
+        read_stage_record(out)
