@@ -20,8 +20,8 @@ from pipelines.running.upstream import require_stage
 from wsm_data.errors import ConfigError
 
 OPTIONS = RunOptions(quiet=True, max_refused=100)
-DOES_NOT_COUNT = {"time", "seconds", "workers", "xxh3"}
-"""What two undisturbed runs do not agree on either: times, and the checksum of a line with times."""
+DOES_NOT_COUNT = {"time", "seconds", "workers", "xxh3", "quarantine.jsonl"}
+"""What two undisturbed runs do not agree on either: times, and checksums of a line and of a file with times."""
 
 
 def without_times(value):
@@ -95,7 +95,7 @@ def before(config, tmp_path):
     return folder
 
 
-def test_killed_before_any_step_to_the_disk_a_run_resumes_to_the_same_state(config, before, tmp_path):
+def test_killed_before_any_step_to_the_disk_a_run_resumes_to_the_same_state(config, before, tmp_path, faults):
     undisturbed = tmp_path / "undisturbed"
     shutil.copytree(before, undisturbed)
     run_stage(COPY, config, undisturbed, OPTIONS)
@@ -118,6 +118,7 @@ def test_killed_before_any_step_to_the_disk_a_run_resumes_to_the_same_state(conf
         if code == 0:
             break
         assert code == -signal.SIGKILL
+        faults["kills of runs"] += 1
     assert at > 30  # the steps of three units, of finish, and of the four records
 
 
@@ -149,15 +150,21 @@ def lines_in(folder):
     return sum(path.read_bytes().count(b"\n") for path in folder.glob("ledger*.jsonl"))
 
 
-@pytest.mark.parametrize("workers", [1, 2])
-def test_killed_at_random_moments_a_run_still_ends_as_undisturbed(tmp_path, source, fakes_on_path, workers):
+@pytest.mark.parametrize(
+    ("workers", "kills"), [(1, 3), (2, 3), *(pytest.param(*one, marks=pytest.mark.slow) for one in ((1, 40), (2, 40)))]
+)
+def test_killed_at_random_moments_a_run_still_ends_as_undisturbed(
+    tmp_path, source, fakes_on_path, workers, kills, faults
+):
     out, undisturbed = tmp_path / "out", tmp_path / "undisturbed"
-    for number in range(13):  # and the three of the fixture
+    units = max(16, kills + 8)
+    for number in range(units - 3):  # and the three of the fixture
         (source / f"u{number:02d}.txt").write_text(f"text {number}")
     program = tmp_path / "program.py"
     program.write_text(PROGRAM)
     moments = random.Random(workers)
-    for reached in (1, 6, 11):
+    for number in range(kills):
+        reached = 1 + number * (units - 5) // kills
         command = [sys.executable, program, source, out, str(workers)]
         with subprocess.Popen(command, env=fakes_on_path, start_new_session=True) as child:
             while lines_in(out) < reached:
@@ -165,6 +172,7 @@ def test_killed_at_random_moments_a_run_still_ends_as_undisturbed(tmp_path, sour
                 time.sleep(0.005)
             time.sleep(moments.uniform(0, 0.06))
             child.kill()
+        faults["kills of runs"] += 1
     run_stage(COPY, CopyConfig(source=source), out, replace(OPTIONS, workers=workers))
     run_stage(COPY, CopyConfig(source=source), undisturbed, OPTIONS)
     resumed, whole = state(out), state(undisturbed)
@@ -172,6 +180,4 @@ def test_killed_at_random_moments_a_run_still_ends_as_undisturbed(tmp_path, sour
         name: whole[name] for name in whole if name != "stage.json"
     }
     assert resumed["stage.json"]["finished"] == whole["stage.json"]["finished"]
-    assert (
-        len({line["unit"] for line in resumed["ledger.jsonl"]}) == len(resumed["ledger.jsonl"]) == 16
-    )  # and the three of the fixture
+    assert len({line["unit"] for line in resumed["ledger.jsonl"]}) == len(resumed["ledger.jsonl"]) == units

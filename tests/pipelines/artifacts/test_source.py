@@ -69,7 +69,9 @@ def test_conventions_that_are_gone_or_damaged_are_never_replaced_by_others(tree,
     index(tree, tmp_path / "index", "synthetic")
     path = conventions_path(tmp_path / "index")
     path.unlink() if damage is None else path.write_text(damage)
-    with pytest.raises(IntegrityError, match=r"conventions\.json must hold the conventions .* run `wsm index` again"):
+    with pytest.raises(
+        IntegrityError, match=r"conventions\.json must hold what `wsm index` wrote, found .* again from `wsm index`"
+    ):
         indexed_source(tmp_path / "index")
 
 
