@@ -16,15 +16,15 @@ from typing import Any, TextIO
 from pipelines.running.stage import Outcome
 from wsm_data.errors import ConfigError, IntegrityError, Reason
 from wsm_data.files.atomic import is_full_disk, write_text
-from wsm_data.files.digest import xxh3_128, xxh3_128_file
+from wsm_data.files.digest import xxh3_128_file
 from wsm_data.files.journal import JournalWriter, journal_files, read_journal, rewrite_journal
 from wsm_data.files.jsonlines import canonical_json, read_lines, write_lines
+from wsm_data.files.sealed import sealed, unsealed
 from wsm_data.schema.verdict import Refusal
 
 STAGE_FILE, LEDGER = "stage.json", "ledger"
 QUARANTINE_FILE, PENDING_FILE = "quarantine.jsonl", "pending.jsonl"
 _SYNC_EVERY_S = 0.2
-_SEAL = "xxh3"
 _CLOCK_STEP_S = 0.001
 """Times are kept in milliseconds; a file is never younger than the line that speaks of it."""
 
@@ -90,12 +90,8 @@ def read_stage_record(folder: Path) -> StageRecord | None:
     if not path.exists():
         return None
     try:
-        fields = json.loads(path.read_text())
-        seal = fields.pop(_SEAL)
-        if seal != _seal_of(fields):
-            raise ValueError("it was changed since it was written")
-        return StageRecord(**fields)
-    except (ValueError, TypeError, KeyError, AttributeError) as error:
+        return StageRecord(**unsealed(json.loads(path.read_text())))
+    except (ValueError, TypeError) as error:
         raise IntegrityError(
             f"{path} is not a stage record ({error}); delete the folder and run the stage again"
         ) from error
@@ -103,12 +99,7 @@ def read_stage_record(folder: Path) -> StageRecord | None:
 
 def write_stage_record(folder: Path, record: StageRecord) -> None:
     """Write stage.json atomically."""
-    sealed = {**vars(record), _SEAL: _seal_of(vars(record))}
-    write_text(folder / STAGE_FILE, json.dumps(sealed, indent=2, sort_keys=True) + "\n")
-
-
-def _seal_of(fields: Mapping[str, Any]) -> str:
-    return xxh3_128(canonical_json(fields).encode())
+    write_text(folder / STAGE_FILE, json.dumps(sealed(vars(record)), indent=2, sort_keys=True) + "\n")
 
 
 def read_ledger(folder: Path, *, with_stale: bool = False) -> dict[str, LedgerEntry]:

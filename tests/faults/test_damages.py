@@ -11,7 +11,7 @@ from wsm_data.access.verify import verify_release
 from wsm_data.errors import WsmError
 from wsm_data.files.journal import read_journal, rewrite_journal
 
-STAGES = ("index", "split", "map", "encode", "pack", "score", "select")
+STAGES = ("index", "split", "map", "encode", "pack", "verify", "score", "select")
 RESULTS = ("pack/release/*", "score/scores.parquet", "select/hard.parquet")
 UNSEEN_S = 1e6
 ATTEMPTS = 4

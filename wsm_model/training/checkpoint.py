@@ -27,6 +27,7 @@ from wsm_data.files.atomic import write_text
 from wsm_data.files.differences import differences
 from wsm_data.files.digest import xxh3_128_file
 from wsm_data.files.jsonlines import canonical_json
+from wsm_data.files.sealed import sealed, unsealed
 from wsm_model.ranks import rank_and_world_size, wait_for_all
 
 _STATE = "state.json"
@@ -74,7 +75,7 @@ def save_checkpoint(folder: Path, model: nn.Module, optimiser: torch.optim.Optim
     wait_for_all()
     if rank == 0:
         record = {"step": state.step, "loader": dict(state.loader), "identity": dict(state.identity)}
-        write_text(path / _STATE, canonical_json(record) + "\n")
+        write_text(path / _STATE, canonical_json(sealed(record)) + "\n")
     wait_for_all()
     return path
 
@@ -123,7 +124,7 @@ def read_state(path: Path) -> TrainingState:
         IntegrityError: it is not what `save_checkpoint` writes.
     """
     try:
-        record = json.loads((path / _STATE).read_text())
+        record = unsealed(json.loads((path / _STATE).read_text()))
         return TrainingState(step=int(record["step"]), loader=record["loader"], identity=record["identity"])
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise IntegrityError(f"{path / _STATE} must be the state of a checkpoint, but: {error}") from error
