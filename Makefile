@@ -11,7 +11,7 @@ DEMO_OUT ?= runs/demo
 PYTEST_WORKERS ?= auto
 PYTEST_OPTIONS ?=
 
-.PHONY: demo test check bench
+.PHONY: demo test check bench faults
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.ready
@@ -25,6 +25,10 @@ check: $(VENV)/.ready-dev
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# Kills, damages and mishaps in full number; what was planted is counted at the end.
+faults: $(VENV)/.ready-dev
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest tests/faults -m "slow or not slow"
 
 bench: $(VENV)/.ready-bench
 	@set -e; for program in $$(grep -l __main__ bench/*.py); do echo "$$program"; $(BIN)/python "$$program"; done

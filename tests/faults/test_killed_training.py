@@ -88,3 +88,17 @@ def test_a_resume_from_beyond_what_was_trained_is_found_out(run, tmp_path):
     session(run, tmp_path, 1)
     with pytest.raises(IntegrityError, match="epoch 0: steps 5 to 6 in no session"):
         audit_run(Path(run["ledger"]), [run["release"]], [], None, None, None)
+
+
+@pytest.mark.slow
+def test_killed_twenty_times_a_run_has_seen_every_clip_as_if_undisturbed(run, tmp_path, faults):
+    run |= {"epochs": 10}
+    for kill in range(20):  # twice an epoch, before and after the step is recorded, alone and as one of two
+        world_size = 1 + kill % 2
+        before = kill % 3 == 0
+        at = [kill // 2, 4 + 4 * (kill % 2)]
+        session(run, tmp_path, world_size, victim=world_size - 1, killed_at=at, killed_before_the_step=before)
+        faults["kills of trainings"] += 1
+    session(run, tmp_path, 1)
+    _, audits = prove(run)
+    assert [(audit.complete, audit.never) for audit in audits] == [(True, 0)] * 10

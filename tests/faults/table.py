@@ -1,0 +1,80 @@
+"""Plants every kind of fault through its test, and writes what happens into docs/reliability.md.
+
+Usage: python tests/faults/table.py
+"""
+
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+DOCUMENT = ROOT / "docs" / "reliability.md"
+BEGIN, END = "<!-- written by tests/faults/table.py -->", "<!-- end -->"
+
+KINDS = (
+    ("killed between any two steps to the disk", "goes on to the same bytes", "tests/faults/test_killed_runs.py"),
+    ("full disk, dead worker, Ctrl-C in a stage", "one sentence; goes on", "tests/faults/test_interrupted_runs.py"),
+    ("ranks of a training killed", "no clip lost or seen twice", "tests/faults/test_killed_training.py"),
+    (
+        "file of a run flipped, cut or swapped",
+        "made again, or refused with exit code 4",
+        "tests/faults/test_damages.py",
+    ),
+    ("checkpoint damaged", "refused; never trained on", "tests/faults/test_damaged_checkpoints.py"),
+    (
+        "output of a stage damaged, same size",
+        "set aside and made again by the same command",
+        "tests/pipelines/running/test_upstream.py",
+    ),
+    (
+        "Ctrl-C or SIGTERM where Python swallows it",
+        "arrives; exit code 130 or 143",
+        "tests/pipelines/running/test_interrupts.py",
+    ),
+    (
+        "SIGTERM to `wsm train`",
+        "saves the step it is at; exit code 143",
+        "tests/wsm_model/training/test_loop.py",
+    ),
+    (
+        "Ctrl-C or full disk while a checkpoint is saved",
+        "one sentence; no half checkpoint",
+        "tests/wsm_model/training/test_checkpoint.py",
+    ),
+    ("disk full, in any command", "one sentence; goes on", "tests/pipelines/running/test_full_disk.py"),
+    (
+        "nothing writable but `--out`",
+        "kernels are kept in a temporary folder",
+        "tests/wsm_data/files/test_kernel_cache.py",
+    ),
+    (
+        "release on a read-only disk",
+        "said before the work; the result stays in `--out`",
+        "tests/pipelines/artifacts/test_release_files.py",
+    ),
+    (
+        "URL where a folder is needed",
+        "refused before any work; exit code 2",
+        "tests/wsm_data/files/test_locations.py",
+    ),
+    ("packages installed that are not asked for", "never imported", "tests/wsm_data/loaders/test_loader_imports.py"),
+)
+"""Kind of fault, what happens, and the test that plants it."""
+
+
+def main() -> int:
+    rows = ["| fault | what happens | planted by | result |", "|---|---|---|---|"]
+    failed = 0
+    for kind, happens, test in KINDS:
+        done = subprocess.run([sys.executable, "-m", "pytest", "-q", test], cwd=ROOT, capture_output=True, text=True)
+        failed += done.returncode != 0
+        rows.append(f"| {kind} | {happens} | `{test}` | {'holds' if done.returncode == 0 else 'DOES NOT HOLD'} |")
+        sys.stdout.write(rows[-1] + "\n")
+    before, _, rest = DOCUMENT.read_text().partition(BEGIN)
+    _, _, after = rest.partition(END)
+    DOCUMENT.write_text(before + "\n".join([BEGIN, *rows, END]) + after)
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
