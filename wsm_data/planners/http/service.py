@@ -3,15 +3,15 @@
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import StrEnum
 from typing import Any
 
 import numpy as np
 
-from wsm_data.errors import WsmError
+from wsm_data.errors import ConfigError, WsmError
 from wsm_data.geometry.planar import points_in_base
 from wsm_data.planners.http.answer import encode_answer
 from wsm_data.planners.http.fault import Fault, WireError
+from wsm_data.planners.http.goal_client import GoalClient
 from wsm_data.planners.http.wire import FARTHEST_CODE, decode_depth_m, decode_goals, decode_image, read_numbers
 from wsm_data.planners.planner import GoalFrame, Observation, Plan, Planner, Sense
 from wsm_data.schema.arrays import Float32Array, Float64Array
@@ -19,15 +19,6 @@ from wsm_data.schema.camera import Intrinsics
 
 _MOST_ENVIRONMENTS = 256
 _FARTHEST_M = np.float32(FARTHEST_CODE / 10000)
-
-
-class GoalClient(StrEnum):
-    """Whose goals these are, which decides one key of the answer."""
-
-    START_GOAL = "start-goal"
-    """The goal is sent once seen and never changes; the answer says where the planner believes it to be."""
-    POINT_GOAL = "point-goal"
-    """The goal is recomputed from the true pose for every request; a client of these stumbles over that key."""
 
 
 _FRAMES = {GoalClient.START_GOAL: GoalFrame.START, GoalClient.POINT_GOAL: GoalFrame.CURRENT}
@@ -169,19 +160,21 @@ class PlannerService:
         return json.dumps({"algo": self.planner.name}).encode()
 
 
-def require_servable(planner: Planner, client: GoalClient) -> str | None:
-    """Why a planner cannot be served to such clients; None where it can.
+def require_servable(planner: Planner, client: GoalClient) -> None:
+    """Check that a planner can do with what the protocol brings: pictures, depth, and such a client's goals.
 
-    The protocol brings pictures and depth. A true pose is missed by none whose goal is always in the current frame.
+    Raises:
+        ConfigError: it needs the map, or its true pose; that is missed by none whose goal is in the current frame.
     """
     if Sense.MAP in planner.senses:
-        return f"{planner.name} needs the map of the scene, which the protocol does not bring"
+        raise ConfigError(
+            f"{planner.name} needs the map of the scene, which the protocol does not bring; serve another planner"
+        )
     if Sense.POSE in planner.senses and client is GoalClient.START_GOAL:
-        return (
+        raise ConfigError(
             f"{planner.name} needs its true pose to know where a goal of the start frame is, and the protocol does not "
             f"bring it; serve it to {GoalClient.POINT_GOAL} clients"
         )
-    return None
 
 
 def _goal_estimate(observation: Observation, plan: Plan) -> Float64Array:

@@ -15,8 +15,9 @@ from PIL import Image
 from wsm_data.errors import ConfigError, RemotePlannerError
 from wsm_data.planners.http.client import ClientConfig, HttpPlanner
 from wsm_data.planners.http.fault import Fault
+from wsm_data.planners.http.goal_client import GoalClient
 from wsm_data.planners.http.server import PlannerServer, ServerConfig
-from wsm_data.planners.http.service import GoalClient, PlannerService
+from wsm_data.planners.http.service import PlannerService
 
 NAME = b'{"algo": "other"}'
 

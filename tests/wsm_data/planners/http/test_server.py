@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from wsm_data.planners.http.goal_client import GoalClient
 from wsm_data.planners.http.server import PlannerServer, ServerConfig
-from wsm_data.planners.http.service import GoalClient, PlannerService
+from wsm_data.planners.http.service import PlannerService
 from wsm_data.planners.planner import Plan
 
 BOUNDARY = "0123456789"
