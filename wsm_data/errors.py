@@ -37,6 +37,8 @@ class Reason(StrEnum):
     FRAME_COUNT_MISMATCH = "frame.count_mismatch"
     FRAME_SIZE_MISMATCH = "frame.size_mismatch"
     DEPTH_NOT_16_BIT = "depth.not_16_bit"
+    COLOUR_BLANK = "colour.blank"
+    COLOUR_DISAGREES = "colour.disagrees"  # colour images do not move as poses and depth images do
     DEPTH_NO_MEASUREMENT = "depth.no_measurement"
 
     # the parquet table of an episode

@@ -224,7 +224,9 @@ def _quality(
     one: _Prepared, latents: tuple[Float32Array, Float32Array], codec: VideoCodec, config: EncodeConfig
 ) -> dict[str, object] | None:
     rank = int(sha256_bytes(one.unit.id.encode())[:8], 16) / 16**8
-    return to_json(measure_quality(one.videos, latents, codec, config.clip)) if rank < config.quality_share else None
+    if rank >= config.quality_share:
+        return None
+    return to_json(measure_quality(one.videos, latents, codec, config.clip, one.record.frame_count))
 
 
 def _finish(config: EncodeConfig, context: StageContext, settled: Settled) -> Finished:

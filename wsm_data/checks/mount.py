@@ -4,6 +4,8 @@ import numpy as np
 
 from wsm_data.checks.limits import verdict_within
 from wsm_data.errors import Reason
+from wsm_data.geometry.camera import T_STORED_OPENCV
+from wsm_data.geometry.transform import invert
 from wsm_data.schema.arrays import Float64Array
 from wsm_data.schema.dataset import DatasetManifest
 from wsm_data.schema.episode import EpisodeRecord
@@ -12,9 +14,27 @@ from wsm_data.schema.verdict import Verdict
 
 
 def check_mount(record: EpisodeRecord, dataset: DatasetManifest) -> Verdict:
-    """Refuse a mount outside its limits, or poses that are not those of a camera mounted so (`mount.misfit`)."""
+    """Refuse a mount outside its limits, or poses that are not those of a camera mounted so (`mount.misfit`).
+
+    Where poses in other camera axes would be, the message names these.
+    """
+    verdict = _mount_verdict(record, record.T_world_camera, dataset)
+    if verdict.keep:
+        return verdict
+    T_world_stored = record.T_world_camera @ invert(T_STORED_OPENCV[dataset.camera_axes])
+    for axes in sorted(set(T_STORED_OPENCV) - {dataset.camera_axes}):
+        if _mount_verdict(record, T_world_stored @ T_STORED_OPENCV[axes], dataset).keep:
+            message = (
+                f"{verdict.message}; it would stand so if the poses were stored as {axes} and not as "
+                f"{dataset.camera_axes}: correct the manifest's camera_axes"
+            )
+            return Verdict(reason=verdict.reason, message=message, measured={**verdict.measured, "fits": axes})
+    return verdict
+
+
+def _mount_verdict(record: EpisodeRecord, T_world_camera: Float64Array, dataset: DatasetManifest) -> Verdict:
     checks = dataset.checks
-    pitch_deg, roll_deg = _pitch_and_roll_deg(record.T_world_camera)
+    pitch_deg, roll_deg = _pitch_and_roll_deg(T_world_camera)
     mount_pitch_deg = float(np.rad2deg(record.camera_pitch_rad))
     disagreement_deg = float(np.abs(pitch_deg - mount_pitch_deg).max())
     limits = {

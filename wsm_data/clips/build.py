@@ -22,7 +22,7 @@ from wsm_data.schema.dataset import DatasetManifest
 from wsm_data.schema.episode import EpisodeRecord
 from wsm_data.schema.frames import EpisodeFrames
 
-QUALITY_STRIDE = 8
+QUALITY_STRIDE = 7
 """Of a clip whose codec quality is measured, every n-th frame is."""
 
 
@@ -115,20 +115,22 @@ def build_clip(
 
 
 def measure_quality(
-    videos: ClipVideos, latents: tuple[Float32Array, Float32Array], codec: VideoCodec, config: ClipConfig
+    videos: ClipVideos, latents: tuple[Float32Array, Float32Array], codec: VideoCodec, config: ClipConfig, frames: int
 ) -> CodecQuality:
-    """Decode a clip's float16 latents again and compare every 8th frame with what went in.
+    """Decode a clip's float16 latents again and compare every 7th of its `frames` own frames with what went in.
 
-    Neighbouring frames show the same surfaces, so the others would tell nothing new.
+    A stride without a factor of the block's length meets all places in a block in turn; those repeated at the end, to
+    fill the last block and to stand still, are left out.
     """
-    rgb, depth = (codec.decode(one.astype(np.float16).astype(np.float32))[::QUALITY_STRIDE] for one in latents)
+    sampled = slice(0, frames, QUALITY_STRIDE)
+    rgb, depth = (codec.decode(one.astype(np.float16).astype(np.float32))[sampled] for one in latents)
     errors = depth_error_by_range(
-        depth_m_from_latent_video(videos.depth[::QUALITY_STRIDE], config.depth_range),
+        depth_m_from_latent_video(videos.depth[sampled], config.depth_range),
         depth_m_from_latent_video(depth, config.depth_range),
-        videos.depth_valid[::QUALITY_STRIDE],
+        videos.depth_valid[sampled],
         DEPTH_EDGES_M,
     )
-    return clip_quality(videos.rgb[::QUALITY_STRIDE], rgb, errors)
+    return clip_quality(videos.rgb[sampled], rgb, errors)
 
 
 def _meta(record: EpisodeRecord, view: SceneView, length: int, provenance: Provenance, config: ClipConfig) -> ClipMeta:

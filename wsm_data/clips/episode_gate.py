@@ -1,11 +1,16 @@
 """Is a trajectory sound? What its images, its poses and the map of its scene say of one another."""
 
+import math
+from itertools import chain
+
 import numpy as np
 
 from wsm_data.checks.cloud_agreement import check_cloud_agreement, height_bands
+from wsm_data.checks.colour_agreement import check_colour_agreement
 from wsm_data.checks.depth_motion import check_depth_motion
 from wsm_data.checks.gate import require_kept
 from wsm_data.clips.depth_gate import DepthSamples, check_samples, sample_depth
+from wsm_data.codecs.images import rgb_pixels
 from wsm_data.geometry.camera import pixel_rays
 from wsm_data.geometry.transform import transform_points
 from wsm_data.maps.scene_map import SceneMap
@@ -17,6 +22,9 @@ from wsm_data.schema.verdict import Verdict
 
 POINTS_PER_FRAME = 800
 """So many pixels of a sampled frame are held against the cloud at most."""
+
+COLOUR_STEPS = 8
+"""Over so many pairs of frames colour is compared at most: decoding colour is what a check costs."""
 
 FARTHEST_M = 4.0
 """Points farther away are not held against the cloud: there the noise of depth cameras nears a voxel."""
@@ -32,8 +40,22 @@ def require_sound(record: EpisodeRecord, frames: EpisodeFrames, scene_map: Scene
     require_kept(
         check_samples(record, samples, dataset),
         check_depth_motion(record, samples.depth_m, samples.steps, dataset.checks.max_depth_error),
+        check_colour(record, frames, samples, dataset),
         check_cloud(record, samples, scene_map, dataset),
     )
+
+
+def check_colour(
+    record: EpisodeRecord, frames: EpisodeFrames, samples: DepthSamples, dataset: DatasetManifest
+) -> Verdict:
+    """Whether colour images move as poses and depth do; where they have another size than depth they tell nothing."""
+    steps = samples.steps[:: max(1, math.ceil(len(samples.steps) / COLOUR_STEPS))]
+    numbers = sorted({*chain(*steps)})
+    rgb_u8 = {each: rgb_pixels(frames.rgb[each], f"{record.id.text}, colour frame {each}") for each in numbers}
+    if any(rgb_u8[each].shape[:2] != samples.depth_m[each].shape for each in numbers):
+        return Verdict(measured={"colour_steps": 0})
+    limit = dataset.checks.min_colour_correlation
+    return check_colour_agreement(record, rgb_u8, samples.depth_m, steps, limit)
 
 
 def check_cloud(record: EpisodeRecord, samples: DepthSamples, scene_map: SceneMap, dataset: DatasetManifest) -> Verdict:

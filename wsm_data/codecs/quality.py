@@ -135,6 +135,7 @@ class CodecQuality:
 
     Attributes:
         clips: how many clips were measured.
+        frames: how many of their frames; 0 where that was not written down.
         squared_error_sum: squared colour errors, with colours in [-1, 1].
         values: colour values measured.
         depth: depth errors by range.
@@ -144,6 +145,7 @@ class CodecQuality:
     squared_error_sum: float
     values: int
     depth: DepthErrors
+    frames: int = 0
 
     @property
     def psnr_db(self) -> float:
@@ -161,6 +163,7 @@ class CodecQuality:
             squared_error_sum=self.squared_error_sum + other.squared_error_sum,
             values=self.values + other.values,
             depth=self.depth.merge(other.depth),
+            frames=self.frames + other.frames,
         )
 
 
@@ -171,4 +174,4 @@ def clip_quality(reference: Float32Array, decoded: Float32Array, depth: DepthErr
         ValueError: the shapes differ.
     """
     squared_error_sum, values = _squared_errors(reference, decoded)
-    return CodecQuality(clips=1, squared_error_sum=squared_error_sum, values=values, depth=depth)
+    return CodecQuality(clips=1, squared_error_sum=squared_error_sum, values=values, depth=depth, frames=len(reference))

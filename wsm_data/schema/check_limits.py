@@ -31,6 +31,8 @@ class CheckLimits:
         min_cloud_share: least share of the points of depth images, over the floor and above it, that lie within a
             voxel of the scene's cloud. On generated homes it is 0.99 and more, with the noise of a Kinect and poses
             that jitter by 1 cm and 0.5 degrees too; a cloud moved by 0.3 m or more leaves 0.71 at most of one of them.
+        min_colour_correlation: least rank correlation of brightness over points that two frames see, median over pairs
+            of frames. On generated homes it is 0.92 and more, 0.79 with a Kinect's noise and jittering poses.
         max_unknown_path_share: largest share of the path over cells of the floor that the scene's cloud never showed.
     """
 
@@ -46,6 +48,7 @@ class CheckLimits:
     max_depth_error: float = 0.02
     min_path_clearance_m: float = 0.10
     min_cloud_share: float = 0.75
+    min_colour_correlation: float = 0.6
     max_unknown_path_share: float = 0.5
 
     def __post_init__(self) -> None:

@@ -37,6 +37,12 @@ def test_poses_in_the_wrong_camera_axes_are_upside_down_even_when_level(make_rec
     verdict = check_mount(make_record(pitch_deg=0.0, T_world_camera=flipped), dataset)
     assert verdict.reason is Reason.MOUNT_MISFIT
     assert verdict.measured["roll_deg"] == pytest.approx(180)
+    assert verdict.measured["fits"] == "opencv"
+    assert "stored as opencv and not as opengl: correct the manifest's camera_axes" in verdict.message
+
+
+def test_where_other_axes_would_not_do_either_none_are_named(make_record, dataset):
+    assert "camera_axes" not in check_mount(make_record(height_m=2.5), dataset).message
 
 
 def test_a_hand_may_pitch_as_it_likes_but_roll_only_within_the_limit(make_record, dataset):

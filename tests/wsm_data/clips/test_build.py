@@ -16,9 +16,11 @@ from wsm_data.errors import DataError, Reason
 from wsm_data.geometry.camera import project
 from wsm_data.geometry.transform import invert, transform_points, transforms_from_vectors
 from wsm_data.schema.occupancy import OccupancyGrid
+from wsm_data.schema.sequence import TEMPORAL_RATIO
 
 DRIVE = along_x()
 FRAMES = frames_of(DRIVE)
+FRAME_COUNT = len(FRAMES.rgb)
 CONFIG = ClipConfig(width=64, height=32)
 PROVENANCE = Provenance(dataset=DATASET, map_digest="map", map_from="cloud", codec="dct", codec_digest="digest")
 FLOAT32 = 1e-6  # rounding of metres and quaternions below ten
@@ -249,17 +251,27 @@ class Codec:
 
 def test_quality_is_that_of_the_stored_float16_latents(videos, latents):
     codec = Codec([videos.rgb, videos.depth])
-    measure_quality(videos, latents, codec, CONFIG)
+    measure_quality(videos, latents, codec, CONFIG, FRAME_COUNT)
     for asked, computed in zip(codec.asked, latents, strict=True):
         assert asked.dtype == np.float32
         np.testing.assert_array_equal(asked, computed.astype(np.float16))
         assert not np.array_equal(asked, computed)
 
 
+def test_quality_is_told_of_all_places_in_a_block_and_of_no_repeated_frame(videos, latents):
+    """Frame t is wrong by t / 100, so that the squared error tells which frames were compared."""
+    length = len(videos.rgb)
+    wrong = videos.rgb + np.arange(length, dtype=np.float32)[:, None, None, None] / 100
+    quality = measure_quality(videos, latents, Codec([wrong, videos.depth]), CONFIG, 9)
+    assert quality.frames == 2  # frames 0 and 7
+    assert quality.squared_error_sum / videos.rgb[0].size == pytest.approx(0.07**2, rel=1e-3)
+    assert {t % TEMPORAL_RATIO for t in range(0, 28, QUALITY_STRIDE)} == {0, 1, 2, 3}
+
+
 def test_a_codec_without_loss_has_no_error(videos, latents):
-    quality = measure_quality(videos, latents, Codec([videos.rgb, videos.depth]), CONFIG)
+    quality = measure_quality(videos, latents, Codec([videos.rgb, videos.depth]), CONFIG, FRAME_COUNT)
     assert (quality.clips, quality.squared_error_sum, quality.psnr_db) == (1, 0.0, np.inf)
-    assert quality.values == videos.rgb[::QUALITY_STRIDE].size
+    assert quality.values == videos.rgb[:FRAME_COUNT:QUALITY_STRIDE].size
     assert sum(quality.depth.error_sum_m) == 0.0
 
 
@@ -269,11 +281,11 @@ def test_errors_are_counted_where_depth_was_measured_and_by_its_true_range(laten
     files = replace(FRAMES, depth=tuple(encoded(".png", image) for image in raw))
     videos = read_videos(record_of(DRIVE), files, DATASET, CONFIG)
     farther = np.clip(videos.depth + 0.1, -1, 1)
-    quality = measure_quality(videos, latents, Codec([np.clip(videos.rgb + 0.2, -1, 1), farther]), CONFIG)
-    shown = videos.depth_valid[::QUALITY_STRIDE]
+    quality = measure_quality(videos, latents, Codec([np.clip(videos.rgb + 0.2, -1, 1), farther]), CONFIG, FRAME_COUNT)
+    shown = videos.depth_valid[:FRAME_COUNT:QUALITY_STRIDE]
     assert sum(quality.depth.counts) == shown.sum() == shown.size // 2
-    true_m = depth_m_from_latent_video(videos.depth, CONFIG.depth_range)[::QUALITY_STRIDE][shown]
-    wrong_m = depth_m_from_latent_video(farther, CONFIG.depth_range)[::QUALITY_STRIDE][shown]
+    true_m = depth_m_from_latent_video(videos.depth, CONFIG.depth_range)[:FRAME_COUNT:QUALITY_STRIDE][shown]
+    wrong_m = depth_m_from_latent_video(farther, CONFIG.depth_range)[:FRAME_COUNT:QUALITY_STRIDE][shown]
     assert quality.depth.edges_m == DEPTH_EDGES_M
     for low, high, count, total in zip(
         DEPTH_EDGES_M, DEPTH_EDGES_M[1:], quality.depth.counts, quality.depth.error_sum_m, strict=False
@@ -285,7 +297,7 @@ def test_errors_are_counted_where_depth_was_measured_and_by_its_true_range(laten
 
 
 def test_what_the_codec_loses_is_between_nothing_and_everything(videos, latents):
-    quality = measure_quality(videos, latents, DctCodec(), CONFIG)
-    frames = videos.rgb[::QUALITY_STRIDE]
+    quality = measure_quality(videos, latents, DctCodec(), CONFIG, FRAME_COUNT)
+    frames = videos.rgb[:FRAME_COUNT:QUALITY_STRIDE]
     spread_db = 10 * np.log10(4 / np.var(frames))  # what a codec would have that knows the mean colour and no more
     assert spread_db + 6 < quality.psnr_db < np.inf

@@ -45,3 +45,23 @@ def test_all_reasons_are_told():
     assert error.reason is Reason.POSE_DEPTH_DISAGREE
     assert Reason.CLOUD_DISAGREES in [one["reason"] for one in error.details["also"]]
     assert "; also cloud.disagrees: " in error.message
+
+
+def test_colour_images_of_something_else_are_refused():
+    rng = np.random.default_rng(0)
+    noise = tuple(rng.integers(0, 255, (48, 64, 3)).astype(np.uint8) for _ in FRAMES.rgb)
+    error = refusal(frames=replace(FRAMES, rgb=noise))
+    assert error.reason is Reason.COLOUR_DISAGREES
+    assert abs(error.details["rank_correlation"]) < 0.2  # of some hundred points that have nothing in common
+
+
+def test_colour_images_of_another_size_than_depth_tell_nothing():
+    small = tuple(np.zeros((24, 32, 3), np.uint8) for _ in FRAMES.rgb)
+    require_sound(record_of(DRIVE), replace(FRAMES, rgb=small), scene(), DATASET)
+
+
+def test_poses_that_stand_still_are_refused():
+    poses = DRIVE.T_world_camera
+    poses[4:] = poses[4]
+    error = refusal(record_of(DRIVE, T_world_camera=poses))
+    assert Reason.POSE_MOTION_DISAGREE in {error.reason, *(one["reason"] for one in error.details.get("also", ()))}
