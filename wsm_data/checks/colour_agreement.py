@@ -82,7 +82,7 @@ def _correlation(
     if len(one) < MIN_POINTS or min(one.std(), other.std()) < MIN_POINT_SPREAD:
         return None
     ranks = [np.argsort(np.argsort(values, kind="stable"), kind="stable") for values in (one, other)]
-    return float(np.corrcoef(ranks)[0, 1])
+    return float(np.asarray(np.corrcoef(ranks))[0, 1])
 
 
 def _seen_in_both(
