@@ -8,13 +8,16 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from wsm_data.checks.depth_agreement import MAX_POINTS, MIN_POINTS
+from wsm_data.checks.depth_agreement import MIN_POINTS
 from wsm_data.checks.depth_pairs import depth_pair, relative_errors
 from wsm_data.errors import Reason
 from wsm_data.geometry.transform import invert
 from wsm_data.schema.arrays import Float32Array, Float64Array
 from wsm_data.schema.episode import EpisodeRecord
 from wsm_data.schema.verdict import Verdict
+
+MAX_POINTS = 400
+"""So many pixels of a frame are compared at most."""
 
 QUANTILE = 0.75
 """A quarter of the points must err by more than the limit: fewer may be what moves, or is hidden from one frame."""

@@ -20,10 +20,10 @@ from wsm_data.schema.episode import EpisodeRecord
 from wsm_data.schema.frames import EpisodeFrames
 from wsm_data.schema.verdict import Verdict
 
-POINTS_PER_FRAME = 800
+POINTS_PER_FRAME = 400
 """So many pixels of a sampled frame are held against the cloud at most."""
 
-COLOUR_STEPS = 8
+COLOUR_STEPS = 4
 """Over so many pairs of frames colour is compared at most: decoding colour is what a check costs."""
 
 FARTHEST_M = 4.0
