@@ -32,7 +32,7 @@ MAX_PAIRS = 7
 STEP_M = 0.3
 """Way between the frames of a chain of pairs: most points of one are seen from the other."""
 
-MAX_STEPS = 16
+MAX_STEPS = 24
 MAX_STEP_FRAMES = 30
 
 _ROUNDING_M = 1e-6
@@ -70,9 +70,8 @@ def sample_depth(record: EpisodeRecord, frames: EpisodeFrames, dataset: DatasetM
 
 def check_samples(record: EpisodeRecord, samples: DepthSamples, dataset: DatasetManifest) -> Verdict:
     """Whether depth images contradict the poses (`pose.depth_disagree`), naming what would fit."""
-    return check_depth_agreement(
-        record, samples.depth_m, samples.pairs, dataset.camera_axes, dataset.checks.max_depth_error
-    )
+    pairs = sorted({*samples.pairs, *samples.steps})
+    return check_depth_agreement(record, samples.depth_m, pairs, dataset.camera_axes, dataset.checks.max_depth_error)
 
 
 def agreeing_records(
