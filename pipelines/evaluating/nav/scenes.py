@@ -1,0 +1,89 @@
+"""Which scenes and episodes are evaluated, and how a scene is opened."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from pipelines.evaluating.nav.config import NavConfig, episode_files
+from wsm_data.errors import ConfigError
+from wsm_data.sim.config import SimConfig
+from wsm_data.sim.episodes import Episode, make_episodes, read_episodes
+from wsm_data.sim.homes import make_home_world
+from wsm_data.sim.world import World
+
+_HOME = re.compile(r"home_([0-9]+)_([0-9]{4,})")
+_FREE_M = 0.1
+"""Generated episodes start and end so far from obstacles, beyond the robot's radius, m."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scene:
+    """A scene that is to be opened.
+
+    Attributes:
+        seed: of the home.
+        index: of the home.
+        episodes: file of its episodes; None where they are generated.
+    """
+
+    seed: int
+    index: int
+    episodes: Path | None = None
+
+    @property
+    def name(self) -> str:
+        """Name in tables."""
+        return f"home_{self.seed}_{self.index:04d}"
+
+
+def list_scenes(config: NavConfig, episodes: int) -> list[tuple[Scene, tuple[int, ...]]]:
+    """Scenes with the numbers of their episodes, so many episodes in all; more of them only add to the list.
+
+    Raises:
+        ConfigError: there is no such world, its files are not of homes, or hold fewer episodes.
+    """
+    per_scene = config.episodes_per_scene
+    counts = [min(per_scene, episodes - start) for start in range(0, episodes, per_scene)]
+    if config.world == "homes":
+        scenes: Sequence[Scene] = [Scene(seed=config.seed, index=index) for index in range(len(counts))]
+    else:
+        scenes = _scenes_of_folder(Path(config.world))
+        counts = counts[: len(scenes)]
+    return [(scene, tuple(range(count))) for scene, count in zip(scenes, counts, strict=False)]
+
+
+def open_world(scene: Scene, config: SimConfig) -> World:
+    """The world of a scene."""
+    return make_home_world(scene.seed, scene.index, config.robot, config.camera_height_m, config.intrinsics)
+
+
+def scene_episodes(scene: Scene, world: World, config: NavConfig) -> tuple[Episode, ...]:
+    """All episodes of a scene, by their numbers.
+
+    Raises:
+        ConfigError: the scene is too small for any, or a file holds fewer than are asked for.
+        IntegrityError: a file does not hold episodes.
+    """
+    count, robot = config.episodes_per_scene, config.sim.robot
+    if scene.episodes is None:
+        return make_episodes(world.grid, count, robot.radius_m + _FREE_M, scene.seed + scene.index)
+    return read_episodes(scene.episodes)
+
+
+def _scenes_of_folder(folder: Path) -> list[Scene]:
+    files = episode_files(folder) if folder.is_dir() else []
+    if not files:
+        raise ConfigError(
+            f"--world must be homes, or a folder of SCENE/pointgoal_start_goal_pairs.npy files, found {str(folder)!r}"
+        )
+    found = []
+    for path in files:
+        match = _HOME.fullmatch(path.parent.name)
+        if match is None:
+            raise ConfigError(
+                f"{path}: its folder must be named home_SEED_INDEX, after a home that can be generated, found "
+                f"{path.parent.name!r}"
+            )
+        found.append(Scene(seed=int(match[1]), index=int(match[2]), episodes=path))
+    return found
