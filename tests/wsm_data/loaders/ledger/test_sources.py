@@ -81,7 +81,7 @@ def test_a_selection_is_found_in_its_release_or_given(tiny, tmp_path):
     assert open_recorded_sources(identity, [str(tiny.folder)], [str(place)]).identity() == sources.identity()
     write_hard(place, tiny, keys[1:4])
     with pytest.raises(
-        ConfigError, match=r"(?s)sources\[0\]\.selection_sha256: saved .*Give the selection of the run by --selection"
+        ConfigError, match=r"(?s)sources\[0\]\.selection_sha256: .* -> .*Give the selection of the run by --selection"
     ):
         open_recorded_sources(identity, [str(tiny.folder)], [str(place)])
 
