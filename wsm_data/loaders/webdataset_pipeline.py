@@ -21,10 +21,10 @@ from wsm_data.errors import ConfigError
 from wsm_data.files.stores import LocalStore
 from wsm_data.loaders.config import Arrangement, OrderConfig, ReadConfig, SourceConfig
 from wsm_data.loaders.order.epoch_order import EpochOrder, order_epoch, rows_per_rank
-from wsm_data.loaders.order.stable_hash import Int64Array
 from wsm_data.loaders.ranks import place_among_ranks
 from wsm_data.loaders.reading.verification import Verification, verification_of
 from wsm_data.loaders.sources.clips import SourceTable, open_sources
+from wsm_data.schema.arrays import Int64Array
 from wsm_data.shards.members import MEMBER_NAMES
 
 
