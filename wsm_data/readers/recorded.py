@@ -37,6 +37,7 @@ class Recording:
         container: id of the folder's container.
         group: group of its trajectories; the last `_`-separated word names the camera.
         scene: name of the scene.
+        episode: name of the recording where a scene has several; its trajectories are numbered where it is cut.
         rgb: names of the N colour images.
         depth: names of the N depth images, empty where a frame has none.
         T_world_camera: float64 [N, 4, 4].
@@ -51,6 +52,7 @@ class Recording:
     depth: tuple[str, ...]
     T_world_camera: Float64Array
     intrinsics: Intrinsics
+    episode: str = ""
     notes: tuple[str, ...] = ()
 
 
@@ -73,8 +75,10 @@ def scan_recording(folder: Path, recording: Recording, dataset: DatasetManifest,
     """
     read: list[_Piece] = []
     refusals = []
-    for number, frames in enumerate(pieces(len(recording.rgb), dataset.motion.max_frames)):
-        id_ = EpisodeId(recording.group, recording.scene, f"{number:06d}")
+    cut = pieces(len(recording.rgb), dataset.motion.max_frames)
+    for number, frames in enumerate(cut):
+        name = f"{recording.episode}_{number:06d}" if recording.episode else f"{number:06d}"
+        id_ = EpisodeId(recording.group, recording.scene, (recording.episode if len(cut) == 1 else "") or name)
         try:
             read.append(_read_piece(folder, recording, id_, frames, sample_every))
         except DataError as error:

@@ -2,12 +2,13 @@
 
 from wsm_data.errors import ConfigError
 from wsm_data.files.typed_toml import did_you_mean
+from wsm_data.readers.array_episodes import ARRAYS
 from wsm_data.readers.interndata.reader import INTERNDATA
 from wsm_data.readers.source import SourceReader
 from wsm_data.readers.tum.reader import TUM
 from wsm_data.schema.dataset import DatasetManifest
 
-READERS: tuple[SourceReader, ...] = (INTERNDATA, TUM)
+READERS: tuple[SourceReader, ...] = (INTERNDATA, TUM, ARRAYS)
 
 
 def source_reader(dataset: DatasetManifest) -> SourceReader:

@@ -1,5 +1,6 @@
 """A hand-held sequence of a generated home in the layout of TUM's benchmark, as a person with a Kinect has it."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -59,6 +60,14 @@ def write_hand_held(folder: Path, *, frames: int = 150, seed: int = 0) -> HandHe
     (folder / "groundtruth.txt").write_text(_trajectory(stamps, T))
     (folder / "camera.txt").write_text(f"# fx fy cx cy\n{CAMERA.fx} {CAMERA.fy} {CAMERA.cx} {CAMERA.cy}\n")
     return HandHeld(stamps_s=stamps, T_world_camera=T, with_depth=with_depth)
+
+
+def walk_frames(frames: int, seed: int = 0) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Colour, depth and pose of each frame of a walk, as arrays."""
+    home = make_home(seed, 0)
+    for pose in _held(_walk(home, frames, np.random.default_rng(seed))):
+        rgb, depth_m = render(home.mesh, pose, CAMERA)
+        yield rgb, depth_m, pose
 
 
 def _walk(home, frames: int, rng: np.random.Generator) -> np.ndarray:

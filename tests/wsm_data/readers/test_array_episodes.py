@@ -1,0 +1,80 @@
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from wsm_data.errors import ConfigError, Reason
+from wsm_data.readers.array_episodes import ARRAYS
+from wsm_data.readers.arrays import EPISODE_FILE, write_episode
+from wsm_data.readers.manifest import load_dataset
+from wsm_data.schema.source.motion import Motion
+
+K = np.array([[24.0, 0, 15.5], [0, 24.5, 11.5], [0, 0, 1]])
+LEVEL = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0.8], [0, 0, 0, 1]])  # looks along y
+
+
+@pytest.fixture(scope="module")
+def dataset():
+    return replace(load_dataset("arrays"), motion=Motion(carried_by="hand"))
+
+
+def frames(count=6, seed=0):
+    rng = np.random.default_rng(seed)
+    for i in range(count):
+        T = LEVEL.copy()
+        T[1, 3] = 0.1 * i
+        yield rng.integers(0, 256, (24, 32, 3), np.uint8), rng.uniform(1, 3, (24, 32)).astype(np.float32), T
+
+
+def scan(source, dataset):
+    (container,) = ARRAYS.find_containers(source, dataset)
+    return container, ARRAYS.scan(source, container, dataset, 2)
+
+
+def test_what_was_written_comes_back_equal(tmp_path, dataset):
+    for number, name in enumerate(("one", "two")):
+        write_episode(tmp_path, "kitchen", name, frames(seed=number), K=K, camera="cam", floor_z_m=0.1)
+    container, found = scan(tmp_path, dataset)
+    assert [record.id.text for record in found.records] == ["arrays_cam/kitchen/one", "arrays_cam/kitchen/two"]
+    record = found.records[1]
+    assert np.array_equal(record.T_world_camera, np.stack([T for _, _, T in frames()]))
+    assert np.array_equal(record.intrinsics.matrix, K)
+    assert record.camera_height_m == pytest.approx(0.7)
+    given = ARRAYS.iter_frames(tmp_path, container, dataset, found.records)
+    read = {one.id.episode: images for one, images in given}
+    assert read["one"].rgb[3] == (tmp_path / "kitchen" / "one" / "rgb" / "000003.png").read_bytes()
+
+
+def test_thinning_and_cutting_are_those_of_the_manifest(tmp_path, dataset):
+    write_episode(tmp_path, "kitchen", "one", frames(9), K=K, floor_z_m=0.0)
+    cut = replace(dataset, motion=Motion(carried_by="hand", min_step_m=0.15, max_frames=3))
+    _, found = scan(tmp_path, cut)
+    assert [record.id.episode for record in found.records] == ["one_000000", "one_000001"]
+    assert np.concatenate([one.T_world_camera[:, 1, 3] for one in found.records]) == pytest.approx(
+        [0, 0.2, 0.4, 0.6, 0.8]
+    )
+
+
+@pytest.mark.parametrize("damage", ["{", "{}", '{"T_world_camera": [1], "K": 2}'])
+def test_a_damaged_episode_is_refused_and_the_other_goes_on(tmp_path, dataset, damage):
+    for name in ("one", "two"):
+        write_episode(tmp_path, "kitchen", name, frames(), K=K, floor_z_m=0.0)
+    (tmp_path / "kitchen" / "one" / EPISODE_FILE).write_text(damage)
+    _, found = scan(tmp_path, dataset)
+    assert [(one.unit, one.reason) for one in found.refusals] == [("arrays/kitchen/one", Reason.SEQUENCE_UNREADABLE)]
+    assert [record.id.episode for record in found.records] == ["two"]
+
+
+def test_more_poses_than_images_are_a_missing_file(tmp_path, dataset):
+    folder = write_episode(tmp_path, "kitchen", "one", frames(), K=K, floor_z_m=0.0)
+    said = json.loads((folder / EPISODE_FILE).read_text())
+    said["T_world_camera"].append(said["T_world_camera"][-1])
+    (folder / EPISODE_FILE).write_text(json.dumps(said))
+    _, found = scan(tmp_path, dataset)
+    assert [one.reason for one in found.refusals] == [Reason.FILE_UNREADABLE]
+
+
+def test_a_source_without_an_episode_says_what_was_looked_for(tmp_path, dataset):
+    with pytest.raises(ConfigError, match=r"<scene>/<episode>/episode\.json"):
+        ARRAYS.find_containers(tmp_path, dataset)

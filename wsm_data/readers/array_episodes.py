@@ -1,0 +1,100 @@
+"""The source that `wsm_data.readers.arrays` writes."""
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import chain
+from pathlib import Path
+
+import numpy as np
+
+from wsm_data.errors import ConfigError, DataError, Reason
+from wsm_data.readers.arrays import EPISODE_FILE
+from wsm_data.readers.folder_signature import folder_signature
+from wsm_data.readers.recorded import Recording, image_size, iter_recorded, scan_recording
+from wsm_data.readers.source import Container, ContainerScan, SourceReader
+from wsm_data.readers.thinning import moving_frames
+from wsm_data.readers.unreadable import read_file
+from wsm_data.schema.camera import Intrinsics
+from wsm_data.schema.dataset import DatasetManifest
+from wsm_data.schema.episode import EpisodeRecord
+from wsm_data.schema.frames import EpisodeFrames
+from wsm_data.schema.verdict import Refusal
+
+EXPECTS = f"<scene>/<episode>/{EPISODE_FILE} with rgb/ and depth/ beside it"
+
+_LAYOUT = "scene"
+
+
+def _find_containers(source: Path, dataset: DatasetManifest) -> list[Container]:
+    """Every scene: a folder with a folder that holds an episode's file."""
+    scenes = sorted({path.parent.parent for path in source.glob(f"*/*/{EPISODE_FILE}")})
+    if not scenes:
+        raise ConfigError(
+            f"the source of data set {dataset.name!r} must hold {EXPECTS}, none is below {source}; the source "
+            "is the folder that was given to write_episode"
+        )
+    return [Container(id=scene.name, layout=_LAYOUT, signature=folder_signature(scene)) for scene in scenes]
+
+
+def _scan(source: Path, container: Container, dataset: DatasetManifest, sample_every: int) -> ContainerScan:
+    scene = source / container.id
+    scans, refusals = [], []
+    for episode in sorted(path.parent.name for path in scene.glob(f"*/{EPISODE_FILE}")):
+        try:
+            recording, floor_z_m = _read_recording(scene, container.id, episode, dataset)
+            own = replace(dataset, motion=replace(dataset.motion, floor_z_m=floor_z_m))
+            scans.append(scan_recording(scene, recording, own, sample_every))
+        except DataError as error:
+            refusals.append(Refusal.from_error(f"{dataset.name}/{container.id}/{episode}", container.id, error))
+    return ContainerScan(
+        records=tuple(chain.from_iterable(scan.records for scan in scans)),
+        refusals=(*refusals, *chain.from_iterable(scan.refusals for scan in scans)),
+        cloud=None,
+        cloud_refusal=None,
+        depth_samples={text: samples for scan in scans for text, samples in scan.depth_samples.items()},
+        bytes_read=sum(scan.bytes_read for scan in scans),
+    )
+
+
+def _read_recording(
+    scene: Path, container: str, episode: str, dataset: DatasetManifest
+) -> tuple[Recording, float | None]:
+    where = f"{container}:{episode}/{EPISODE_FILE}"
+    try:
+        said = json.loads(read_file(str(scene / episode / EPISODE_FILE), where))
+        T_world_camera = np.array(said["T_world_camera"], np.float64).reshape(-1, 4, 4)
+        K = np.array(said["K"], np.float64).reshape(3, 3)
+        width, height = image_size(scene, f"{episode}/rgb/000000.png", container)
+        intrinsics = Intrinsics(fx=K[0, 0], fy=K[1, 1], cx=K[0, 2], cy=K[1, 2], width=width, height=height)
+        camera, floor = str(said["camera"]), said["floor_z_m"]
+        floor_z_m = dataset.motion.floor_z_m if floor is None else float(floor)
+    except (ValueError, KeyError, TypeError) as error:
+        raise DataError(
+            Reason.SEQUENCE_UNREADABLE,
+            f"{where} must be as write_episode wrote it, but {error}; write it again",
+        ) from error
+    kept = moving_frames(T_world_camera, dataset.motion).tolist()
+    recording = Recording(
+        container=container,
+        group=f"{dataset.name}_{camera}",
+        scene=container,
+        episode=episode,
+        rgb=tuple(f"{episode}/rgb/{i:06d}.png" for i in kept),
+        depth=tuple(f"{episode}/depth/{i:06d}.png" for i in kept),
+        T_world_camera=T_world_camera[kept],
+        intrinsics=intrinsics,
+    )
+    return recording, floor_z_m
+
+
+def _iter_frames(
+    source: Path, container: Container, dataset: DatasetManifest, records: Sequence[EpisodeRecord]
+) -> Iterator[tuple[EpisodeRecord, EpisodeFrames]]:
+    del dataset  # files are given as they are stored
+    return iter_recorded(source / container.id, records)
+
+
+ARRAYS = SourceReader(
+    name="arrays", expects=EXPECTS, find_containers=_find_containers, scan=_scan, iter_frames=_iter_frames
+)

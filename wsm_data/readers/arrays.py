@@ -1,0 +1,114 @@
+"""Write a source from numpy arrays, frame by frame: the way in for data of any other kind. docs/sources.md shows it.
+
+An episode is a folder `<source>/<scene>/<episode>/` of `rgb/000000.png`, `depth/000000.png` and `episode.json`. It
+appears when it is complete, and not at all where a frame is refused. Read it with the manifest `arrays`.
+"""
+
+import json
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from wsm_data.geometry.transform import rigidity_error
+from wsm_data.schema.arrays import Float32Array, Float64Array, Uint8Array, require_array, require_finite
+from wsm_data.schema.camera import Intrinsics
+from wsm_data.schema.identity import EpisodeId
+from wsm_data.synth.writers.containers import Member, write_folder
+from wsm_data.synth.writers.images import depth_codes, encode_png_16
+
+Frame = tuple[Uint8Array, Float32Array, Float64Array]
+"""rgb_u8 [H, W, 3]; depth_m [H, W] along the optical axis, 0 or NaN without measurement; T_world_camera [4, 4]."""
+
+METRES_PER_UNIT = 1e-4
+"""Depth is stored in tenths of a millimetre; what is farther than 6.55 m has no measurement. As the manifest says."""
+
+MAX_RIGIDITY_ERROR = 1e-3
+MAX_MEDIAN_DEPTH_M = 100.0
+EPISODE_FILE = "episode.json"
+
+_PNG_LEVEL = 2
+
+
+def write_episode(
+    source: Path,
+    scene: str,
+    episode: str,
+    frames: Iterable[Frame],
+    *,
+    K: Float64Array,
+    camera: str = "camera",
+    floor_z_m: float | None = None,
+) -> Path:
+    """Write one episode; returns its folder. One that was there is replaced.
+
+    Args:
+        source: root of the source; made where it does not exist.
+        scene: name of the place; episodes of a scene share its map, and so its world.
+        episode: name of the episode.
+        frames: colour, depth and pose of each frame in time order, as a generator gives them. Poses: an
+            OpenCV camera (x right, y down, z forward) in a world with z up, m.
+        K: camera matrix [3, 3], px, for the centre of the first pixel at (0, 0).
+        camera: name of the camera, without `_`.
+        floor_z_m: height of the floor, m; None where depth shows it.
+
+    Raises:
+        ValueError: an array of another type, shape or size, a pose that is not rigid, depth that is negative or cannot
+            be in metres, a camera that does not fit the images, a name that is none, or no frame at all.
+    """
+    EpisodeId(f"arrays_{camera}", scene, episode)  # refuses names that are paths
+    if "_" in camera:
+        raise ValueError(f"the name of a camera must not hold '_', found {camera!r}")
+    folder = source / scene / episode
+    write_folder(folder, _members(frames, K, camera, floor_z_m))
+    return folder
+
+
+def _members(frames: Iterable[Frame], K: Float64Array, camera: str, floor_z_m: float | None) -> Iterator[Member]:
+    poses: list[list[float]] = []
+    intrinsics = None
+    for number, (rgb_u8, depth_m, T_world_camera) in enumerate(frames):
+        intrinsics = intrinsics or _intrinsics(K, rgb_u8)
+        _require_frame(number, rgb_u8, depth_m, T_world_camera, intrinsics)
+        poses.append(np.asarray(T_world_camera, np.float64).ravel().tolist())
+        yield f"rgb/{number:06d}.png", cv2.imencode(".png", rgb_u8[..., ::-1])[1].tobytes()
+        codes = depth_codes(np.nan_to_num(depth_m, posinf=0.0).astype(np.float32), METRES_PER_UNIT)
+        yield f"depth/{number:06d}.png", encode_png_16(codes, _PNG_LEVEL)
+    if intrinsics is None:
+        raise ValueError("an episode must have frames, found none")
+    said = {"camera": camera, "K": intrinsics.matrix.tolist(), "floor_z_m": floor_z_m, "T_world_camera": poses}
+    yield EPISODE_FILE, (json.dumps(said) + "\n").encode()
+
+
+def _intrinsics(K: Float64Array, rgb_u8: Uint8Array) -> Intrinsics:
+    require_array("rgb_u8 of frame 0", rgb_u8, np.uint8, (None, None, 3))
+    matrix = np.asarray(K, np.float64)
+    require_array("K", matrix, np.float64, (3, 3))
+    if matrix[0, 1] != 0 or matrix[1, 0] != 0 or (matrix[2] != (0, 0, 1)).any():
+        raise ValueError(f"K must be [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], found {matrix.tolist()}")
+    fx, fy, cx, cy = matrix[[0, 1, 0, 1], [0, 1, 2, 2]].tolist()
+    return Intrinsics(fx=fx, fy=fy, cx=cx, cy=cy, width=rgb_u8.shape[1], height=rgb_u8.shape[0])
+
+
+def _require_frame(
+    number: int, rgb_u8: Uint8Array, depth_m: Float32Array, T_world_camera: Float64Array, intrinsics: Intrinsics
+) -> None:
+    size = intrinsics.height, intrinsics.width
+    require_array(f"rgb_u8 of frame {number}", rgb_u8, np.uint8, (*size, 3))
+    require_array(f"depth_m of frame {number}", depth_m, np.float32, size)
+    require_array(f"T_world_camera of frame {number}", T_world_camera, np.float64, (4, 4))
+    require_finite(f"T_world_camera of frame {number}", T_world_camera)
+    error = float(rigidity_error(T_world_camera))
+    if error > MAX_RIGIDITY_ERROR:
+        raise ValueError(
+            f"T_world_camera of frame {number} must be a rotation and a translation within {MAX_RIGIDITY_ERROR}, found "
+            f"{T_world_camera.tolist()}"
+        )
+    measured = depth_m[depth_m != 0]
+    measured = measured[np.isfinite(measured)]
+    if len(measured) and (measured.min() < 0 or np.median(measured) > MAX_MEDIAN_DEPTH_M):
+        raise ValueError(
+            f"depth_m of frame {number} must be in metres and not negative, found {measured.min():g} to "
+            f"{measured.max():g} with a median of {np.median(measured):g}; is it in millimetres?"
+        )
