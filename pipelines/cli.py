@@ -10,7 +10,7 @@ from typing import Any, NoReturn
 import typer
 from typer.core import TyperGroup
 
-from pipelines.commands import audit, audit_run, bench, evaluate, inspect, run, serve, stages, train
+from pipelines.commands import audit, audit_run, bench, evaluate, inspect, run, serve, source, stages, train
 from pipelines.commands.command import Command, CommandGroup
 from pipelines.running.interrupts import (
     INTERRUPTED_EXIT_CODE,
@@ -32,6 +32,7 @@ COMMANDS: tuple[Command | CommandGroup, ...] = (
     train.COMMAND,
     evaluate.GROUP,
     serve.COMMAND,
+    source.GROUP,
     bench.GROUP,
 )
 """In the order of `wsm --help`."""

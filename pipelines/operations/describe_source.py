@@ -1,0 +1,152 @@
+"""What a source holds: the manifests that fit its layout, and what the first pass of `wsm index` would make of it."""
+
+import json
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import typer
+
+from wsm_data.checks.record import record_refusal
+from wsm_data.errors import ConfigError, DataError
+from wsm_data.files.json_values import to_json
+from wsm_data.readers.manifest import load_dataset
+from wsm_data.readers.registry import READERS, source_reader
+from wsm_data.readers.source import Container, ContainerScan
+from wsm_data.schema.dataset import DatasetManifest
+from wsm_data.schema.verdict import Refusal
+
+GUESSES = (
+    ("arrays", "tum_rgbd", "bonn_rgbd", "replica_sequences", "scannet_sequences", "icl_nuim"),
+    ("interndata_n1", "synthetic"),
+)
+"""Manifests that are tried; the last ones only where no other fits, for any two folders could be InternData's."""
+
+_DEPTH_SAMPLE_EVERY = 10
+
+
+@dataclass(frozen=True, kw_only=True)
+class SourceDescription:
+    """What was found of a source.
+
+    Attributes:
+        dataset: the manifest it was read with.
+        reader: its reader.
+        fits: all manifests whose layout fits, the one that was taken first.
+        containers: how many there are.
+        read: how many of them were read.
+        trajectories: usable ones in the containers that were read.
+        frames: of these.
+        cameras: usable trajectories by `name width x height fx`.
+        with_cloud: containers with a point cloud.
+        notes: trajectories by note.
+        refusals: what would be refused, with the reason.
+    """
+
+    dataset: str
+    reader: str
+    fits: tuple[str, ...]
+    containers: int
+    read: int
+    trajectories: int
+    frames: int
+    cameras: dict[str, int]
+    with_cloud: int
+    notes: dict[str, int]
+    refusals: tuple[Refusal, ...]
+
+
+def show_source(source: Path, dataset: str, limit: int, as_json: bool) -> None:
+    """Print what a source holds.
+
+    Raises:
+        ConfigError: no manifest fits, or the one that was given does not.
+    """
+    found = describe_source(source, dataset, limit)
+    typer.echo(json.dumps(to_json(found), indent=2) if as_json else "\n".join(_lines(found)))
+
+
+def describe_source(source: Path, dataset: str, limit: int) -> SourceDescription:
+    """Read the containers of a source as `wsm index` would, and write nothing.
+
+    Args:
+        source: its root.
+        dataset: the manifest to read it with; empty: the first that fits of `GUESSES`.
+        limit: how many containers are read at most; 0: all.
+
+    Raises:
+        ConfigError: as `show_source`.
+    """
+    guesses = ([name for name in names if _fits(source, load_dataset(name))] for names in GUESSES)
+    fits = [dataset] if dataset else next(filter(None, guesses), [])
+    if not fits:
+        raise ConfigError(f"{source} must be a source, and none fits; what was looked for:\n{_looked_for()}")
+    manifest = load_dataset(fits[0])
+    containers = source_reader(manifest).find_containers(source, manifest)
+    read = containers[:limit] if limit else containers
+    scans, refusals = _scans(source, read, manifest)
+    kept = []
+    for record in (record for scan in scans for record in scan.records):
+        refusal = record_refusal(record, manifest)
+        if refusal is None:
+            kept.append(record)
+        else:
+            refusals.append(refusal)
+    cameras = [(one.id.camera, one.intrinsics) for one in kept]
+    return SourceDescription(
+        dataset=manifest.name,
+        reader=manifest.reader,
+        fits=tuple(fits),
+        containers=len(containers),
+        read=len(read),
+        trajectories=len(kept),
+        frames=sum(record.frame_count for record in kept),
+        cameras=dict(Counter(f"{name} {K.width} x {K.height} px, fx {K.fx:g}" for name, K in cameras)),
+        with_cloud=sum(scan.cloud is not None for scan in scans),
+        notes=dict(Counter(note for record in kept for note in record.notes)),
+        refusals=tuple(refusals),
+    )
+
+
+def _fits(source: Path, dataset: DatasetManifest) -> bool:
+    try:
+        return bool(source_reader(dataset).find_containers(source, dataset))
+    except ConfigError:
+        return False
+
+
+def _scans(
+    source: Path, containers: Sequence[Container], dataset: DatasetManifest
+) -> tuple[list[ContainerScan], list[Refusal]]:
+    scans: list[ContainerScan] = []
+    refusals: list[Refusal] = []
+    for container in containers:
+        try:
+            scan = source_reader(dataset).scan(source, container, dataset, _DEPTH_SAMPLE_EVERY)
+        except DataError as error:
+            refusals.append(Refusal.from_error(container.id, container.id, error))
+            continue
+        scans.append(scan)
+        refusals += [*scan.refusals, *([scan.cloud_refusal] if scan.cloud_refusal else [])]
+    return scans, refusals
+
+
+def _looked_for() -> str:
+    return "\n".join(f"  {reader.name}: {reader.expects}" for reader in READERS)
+
+
+def _lines(found: SourceDescription) -> list[str]:
+    lines = [
+        f"manifest: {found.dataset} (reader {found.reader})",
+        *([f"fit as well: {', '.join(found.fits[1:])}; choose with --dataset"] if found.fits[1:] else []),
+        f"containers: {found.containers}, of which {found.read} were read, {found.with_cloud} with a point cloud",
+        f"trajectories: {found.trajectories} of {found.frames} frames",
+        *(f"camera: {name}: {count} trajectories" for name, count in found.cameras.items()),
+        *(f"note: {name}: {count} trajectories" for name, count in found.notes.items()),
+        f"would be refused: {len(found.refusals)}",
+        *(f"  {one.unit}: {one.reason}: {one.message}" for one in found.refusals),
+    ]
+    if not found.trajectories:
+        lines += [f"nothing can be used; is it another layout? What was looked for:\n{_looked_for()}"]
+    return lines
