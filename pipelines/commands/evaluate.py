@@ -1,8 +1,10 @@
 """`wsm eval`: the evaluations of the paper."""
 
-from pipelines.commands import eval_nav
+from pipelines.commands import eval_nav, eval_slam
 from pipelines.commands.command import CommandGroup
 
 GROUP = CommandGroup(
-    name="eval", summary="Evaluate a planner or a model, as the paper's tables do.", commands=(eval_nav.COMMAND,)
+    name="eval",
+    summary="Evaluate a planner, a model or another system, as the paper's tables do.",
+    commands=(eval_nav.COMMAND, eval_slam.COMMAND),
 )

@@ -1,0 +1,44 @@
+"""The model's SLAM over a clip: RGB latents one after the other, as in use."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from pipelines.evaluating.slam_sequence import Reconstruction, reconstruction
+from wsm_data.access.release import Release
+from wsm_data.codecs.base import VideoCodec
+from wsm_data.errors import ConfigError
+from wsm_data.loaders.batches.standardise import standardisations
+from wsm_data.schema.clip import Clip
+from wsm_data.shards.latent_standard import latent_standard
+from wsm_model.config import Variant
+from wsm_model.evaluation.held_out import estimate_states
+from wsm_model.inference.session import SessionConfig
+from wsm_model.losses.pose import raw_frame_poses
+from wsm_model.model_file import load_model
+
+
+def model_estimator(folder: Path, release: Release, codec: VideoCodec) -> Callable[[Clip], Reconstruction]:
+    """What estimates poses and depth of a clip from its RGB latents alone.
+
+    Raises:
+        ConfigError: there is no model, it was trained on other latents, or it is one without SLAM.
+        IntegrityError: its files are damaged.
+    """
+    standard = latent_standard(release.manifest)
+    model, _ = load_model(folder, standard)
+    if model.config.variant is not Variant.SLAM:
+        raise ConfigError(f"the model in {folder} must estimate states, and it is one without SLAM; name another")
+    device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
+    model.to(device)
+    standardise = standardisations(release.manifest)["rgb"]
+
+    def estimate(clip: Clip) -> Reconstruction:
+        stored = torch.from_numpy(clip.rgb_latent.astype(np.float32)).to(device)
+        depth, poses = estimate_states(model, standardise.whole(stored, torch.float32), SessionConfig())
+        latents = standard.raw_depth(depth.float().cpu().numpy())
+        return reconstruction(clip, codec, latents, raw_frame_poses(poses.float().cpu()).double().numpy(), None)
+
+    return estimate

@@ -1,0 +1,123 @@
+"""A sequence to be estimated, with its truth, and an estimate of it: poses of its frames, and points."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from wsm_data.codecs.base import VideoCodec
+from wsm_data.codecs.depth import depth_m_from_latent_video
+from wsm_data.codecs.ply import ply_bytes
+from wsm_data.errors import DataError, Reason
+from wsm_data.files.atomic import write_bytes
+from wsm_data.geometry.camera import pixel_rays
+from wsm_data.geometry.transform import transform_points, transforms_from_vectors
+from wsm_data.metrics.tum import StampedTrajectory, read_tum, write_tum
+from wsm_data.readers.ply import read_point_cloud, require_finite_points
+from wsm_data.schema.arrays import BoolArray, Float32Array, Float64Array, Uint8Array
+from wsm_data.schema.clip import Clip
+from wsm_data.schema.point_cloud import PointCloud
+from wsm_data.schema.sequence import TEMPORAL_RATIO
+
+TRAJECTORY_FILES = ("trajectory.txt", "final_traj.txt")
+CLOUD_FILES = ("cloud.ply", "final.ply")
+"""As they are written here, and as SLAM-Former leaves them."""
+
+MAX_DEPTH_M = 5.0
+"""What is farther is no point, neither of the truth nor of an estimate."""
+_EVERY_PX = 4
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reconstruction:
+    """Poses of frames, and points.
+
+    Attributes:
+        trajectory: its stamps are numbers of frames.
+        cloud: in the frame that the poses stand in.
+    """
+
+    trajectory: StampedTrajectory
+    cloud: PointCloud
+
+
+def true_reconstruction(clip: Clip, codec: VideoCodec) -> Reconstruction:
+    """The truth of a clip in the first camera's frame: its recorded frames, and the points of its measured depth.
+
+    Depth is what the stored latents decode to, where every pixel of a latent's cell was measured.
+    """
+    measured = clip.depth_valid == np.iinfo(np.uint8).max
+    ratio = codec.describe().spatial_ratio
+    seen = measured.repeat(ratio, axis=1).repeat(ratio, axis=2)
+    return reconstruction(clip, codec, clip.depth_latent.astype(np.float32), clip.poses.astype(np.float64), seen)
+
+
+def reconstruction(
+    clip: Clip, codec: VideoCodec, depth_latents: Float32Array, poses: Float64Array, seen: BoolArray | None
+) -> Reconstruction:
+    """Poses [T, 7] and raw depth latents [F, C, h, w] of a clip's frames as a trajectory and points.
+
+    Each latent gives the points of its last frame, one for every fourth pixel either way; still frames that were added
+    to the clip give none.
+
+    Args:
+        clip: gives colours and the camera.
+        codec: of the latents.
+        depth_latents: of the clip, estimated or true.
+        poses: of its frames, likewise.
+        seen: pixels [F, H, W] that have a depth; None for all.
+    """
+    recorded = clip.meta.frames - clip.meta.padded_frames
+    T_camera0_camera = transforms_from_vectors(poses[:recorded])
+    depth_m = depth_m_from_latent_video(codec.decode(depth_latents), clip.meta.depth_range)
+    rgb = np.round((np.clip(codec.decode(clip.rgb_latent.astype(np.float32)), -1, 1) + 1) * 127.5).astype(np.uint8)
+    rays = pixel_rays(clip.intrinsics)
+    parts = []
+    for latent, frame in enumerate(range(0, recorded, TEMPORAL_RATIO)):
+        kept = depth_m[frame] <= MAX_DEPTH_M
+        if seen is not None:
+            kept &= seen[latent]
+        parts.append(_points(depth_m[frame], rgb[frame], kept, rays, T_camera0_camera[frame]))
+    points, colours = (np.concatenate(some) for some in zip(*parts, strict=True))
+    return Reconstruction(
+        trajectory=StampedTrajectory(stamps_s=np.arange(recorded, dtype=np.float64), T_world_camera=T_camera0_camera),
+        cloud=PointCloud(xyz_m=points.astype(np.float32), rgb_u8=colours),
+    )
+
+
+def _points(
+    depth_m: Float32Array, rgb_u8: Uint8Array, kept: BoolArray, rays: Float64Array, T_camera0_camera: Float64Array
+) -> tuple[Float64Array, Uint8Array]:
+    thin = (slice(None, None, _EVERY_PX),) * 2
+    chosen = kept[thin]
+    points = (rays[thin] * depth_m[thin][..., None])[chosen]
+    return transform_points(T_camera0_camera, points), rgb_u8[thin][chosen]
+
+
+def write_reconstruction(folder: Path, found: Reconstruction) -> None:
+    """Write a trajectory in TUM's format and points as PLY."""
+    write_tum(folder / TRAJECTORY_FILES[0], found.trajectory)
+    write_bytes(folder / CLOUD_FILES[0], ply_bytes(found.cloud))
+
+
+def read_reconstruction(folder: Path) -> Reconstruction:
+    """Read what `write_reconstruction`, or another system under its own names, wrote.
+
+    Raises:
+        DataError: a file is missing, or is none of its kind.
+    """
+    trajectory = read_tum(_one_of(folder, TRAJECTORY_FILES, Reason.TRAJECTORY_UNREADABLE))
+    cloud = read_point_cloud(_one_of(folder, CLOUD_FILES, Reason.CLOUD_MISSING))
+    require_finite_points(cloud)
+    return Reconstruction(trajectory=trajectory, cloud=cloud)
+
+
+def _one_of(folder: Path, names: tuple[str, ...], reason: Reason) -> Path:
+    found = [folder / name for name in names if (folder / name).is_file()]
+    if len(found) != 1:
+        raise DataError(
+            reason,
+            f"{folder} must hold one of {' and '.join(names)}, found {len(found)}; put the estimate there",
+            {"folder": folder},
+        )
+    return found[0]

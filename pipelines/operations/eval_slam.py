@@ -1,0 +1,127 @@
+"""`wsm eval slam`: camera poses and points of a model, or of any other system, against a release's held-out clips."""
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import pyarrow as pa
+import typer
+from tqdm import tqdm
+
+from pipelines.evaluating.slam_errors import METRICS, SequenceErrors, sequence_errors, summarise
+from pipelines.evaluating.slam_sequence import (
+    Reconstruction,
+    read_reconstruction,
+    true_reconstruction,
+    write_reconstruction,
+)
+from wsm_data.access.release import Release, open_release
+from wsm_data.errors import ConfigError
+from wsm_data.files.atomic import write_text
+from wsm_data.files.tables import write_table
+from wsm_data.schema.clip import Clip
+from wsm_data.shards.release_codec import codec_of
+from wsm_data.view.drawing.text_table import aligned
+
+
+@dataclass(frozen=True, kw_only=True)
+class SlamRequest:
+    """What is evaluated.
+
+    Attributes:
+        model: folder of a model; or
+        estimates: folder with a folder for each sequence, named by the clip's key.
+        split: split of the clips.
+        limit: at most this many clips; 0: all.
+        weights: folder of the codec's weights, where it has any.
+        seed: of the intervals.
+    """
+
+    model: Path | None
+    estimates: Path | None
+    split: str
+    limit: int
+    weights: str
+    seed: int
+
+
+def eval_slam(location: str, request: SlamRequest, out: Path, quiet: bool) -> None:
+    """Evaluate, write summary.json, sequences.parquet and every sequence's TUM and PLY, and print the means.
+
+    Raises:
+        ConfigError: not one of model and estimates is named, or the split has no clips.
+        DataError: a sequence has no estimate, or an unreadable one.
+    """
+    if request.model is not None and request.estimates is not None:
+        raise ConfigError("an evaluation is of one system: name either --model or --estimates")
+    release = open_release(location)
+    keys = held_out_keys(release, request.split, request.limit)
+    codec = codec_of(release.manifest, request.weights)
+    estimate = _estimator(release, request)
+    errors = []
+    for key in tqdm(keys, unit="sequence", disable=quiet):
+        clip = release.read_clip(key)
+        estimated, true = estimate(clip), true_reconstruction(clip, codec)
+        for name, one in (("estimated", estimated), ("true", true)):
+            write_reconstruction(out / "sequences" / key / name, one)
+        errors.append(sequence_errors(key, clip.meta.id.physical_scene, estimated, true))
+    write_table(out / "sequences.parquet", sequence_table(errors))
+    summary = {
+        "release": release.digest,
+        "split": request.split,
+        "system": str(request.model or request.estimates),
+        **summarise(errors, request.seed),
+    }
+    write_text(out / "summary.json", json.dumps(summary, indent=1) + "\n")
+    typer.echo(summary_table(summary))
+    typer.echo(f"summary: {out / 'summary.json'}")
+
+
+def held_out_keys(release: Release, split: str, limit: int) -> Sequence[str]:
+    """Keys of a split's clips, sorted.
+
+    Raises:
+        ConfigError: there is none.
+    """
+    pairs = zip(release.index.texts("key"), release.index.texts("split"), strict=True)
+    keys = sorted(key for key, of_split in pairs if of_split == split)
+    if not keys:
+        found = ", ".join(sorted(release.manifest.clips_by_split))
+        raise ConfigError(f"the release {release.manifest.name} must have clips of the split {split!r}, it has {found}")
+    return keys[:limit] if limit else keys
+
+
+def sequence_table(errors: Sequence[SequenceErrors]) -> pa.Table:
+    """A row a sequence."""
+    columns = {
+        "key": pa.array([one.key for one in errors], pa.string()),
+        "scene": pa.array([one.scene for one in errors], pa.string()),
+        "poses": pa.array([one.poses for one in errors], pa.int64()),
+        "refused": pa.array([one.refused for one in errors], pa.string()),
+    }
+    columns |= {name: pa.array([one.values[name] for one in errors], pa.float64()) for name in METRICS}
+    return pa.table(columns)
+
+
+def summary_table(summary: dict[str, object]) -> str:
+    """Means with their intervals."""
+    rows = [["metric", "mean over scenes", "95 % interval", "sequences"]]
+    for name in METRICS:
+        one = summary[name]
+        if isinstance(one, dict):
+            rows.append([name, f"{one['value']:.4f}", f"{one['low']:.4f} .. {one['high']:.4f}", str(one["sequences"])])
+        else:
+            rows.append([name, "-", "-", "0"])
+    return aligned(rows) + f"\nrefused: {summary['refused'] or 'none'}"
+
+
+def _estimator(release: Release, request: SlamRequest) -> Callable[[Clip], Reconstruction]:
+    if request.model is not None:
+        from pipelines.evaluating.slam_model import model_estimator  # other systems are evaluated without torch
+
+        return model_estimator(request.model, release, codec_of(release.manifest, request.weights))
+    folder = request.estimates
+    if folder is None:
+        raise ConfigError("an evaluation needs a system: name either --model or --estimates")
+    return lambda clip: read_reconstruction(folder / clip.meta.key)
