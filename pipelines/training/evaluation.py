@@ -59,7 +59,10 @@ def evaluation_table(errors: list[ClipErrors], flow: FlowErrors, clips: int) -> 
 
 
 def _state_rows(errors: list[ClipErrors]) -> list[list[str]]:
-    ate, still, steady = (mean_of(errors, name) for name in ("ate_m", "zero_motion_ate_m", "constant_velocity_ate_m"))
+    ate, still, steady = (
+        mean_of(errors, name)
+        for name in ("ate_rmse_unaligned_m", "ate_rmse_zero_motion_m", "ate_rmse_constant_velocity_m")
+    )
     depth, mean_depth = mean_of(errors, "depth_mse"), mean_of(errors, "mean_depth_mse")
     return [
         ["camera ATE, not aligned (m)", f"{ate:.3f}", f"zero motion {still:.3f}, constant velocity {steady:.3f}"],

@@ -10,10 +10,11 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from wsm_data.metrics.trajectory import ate_rmse_unaligned_m
 from wsm_data.schema.batch import ClipBatch
 from wsm_data.schema.sequence import chunk_start
 from wsm_model.batches import TrainingInputs, training_inputs
-from wsm_model.evaluation.trajectory import ate_rmse_m, constant_velocity, zero_motion
+from wsm_model.evaluation.trajectory import constant_velocity, zero_motion
 from wsm_model.inference.session import Session, SessionConfig
 from wsm_model.losses.flow import flow_errors
 from wsm_model.losses.pose import raw_frame_poses
@@ -27,17 +28,18 @@ class ClipErrors:
 
     Attributes:
         key: of the clip.
-        ate_m: camera centres of the recorded frames, not aligned, m; still frames that were added do not count.
-        zero_motion_ate_m: of a camera that stays.
-        constant_velocity_ate_m: of a camera that goes on as it truly began.
+        ate_rmse_unaligned_m: camera centres of the recorded frames, not aligned, m; still frames that were added do
+            not count.
+        ate_rmse_zero_motion_m: of a camera that stays.
+        ate_rmse_constant_velocity_m: of a camera that goes on as it truly began.
         depth_mse: of standardised depth latents.
         mean_depth_mse: of predicting the training mean.
     """
 
     key: str
-    ate_m: float
-    zero_motion_ate_m: float
-    constant_velocity_ate_m: float
+    ate_rmse_unaligned_m: float
+    ate_rmse_zero_motion_m: float
+    ate_rmse_constant_velocity_m: float
     depth_mse: float
     mean_depth_mse: float
 
@@ -87,9 +89,9 @@ def clip_errors(model: WorldSlamModel, batch: ClipBatch[Tensor], config: Session
         found.append(
             ClipErrors(
                 key=batch.keys[number],
-                ate_m=ate_rmse_m(estimated, true),
-                zero_motion_ate_m=ate_rmse_m(zero_motion(true), true),
-                constant_velocity_ate_m=ate_rmse_m(constant_velocity(true), true),
+                ate_rmse_unaligned_m=ate_rmse_unaligned_m(estimated, true),
+                ate_rmse_zero_motion_m=ate_rmse_unaligned_m(zero_motion(true), true),
+                ate_rmse_constant_velocity_m=ate_rmse_unaligned_m(constant_velocity(true), true),
                 depth_mse=float((depth - true_depth).square().mean()),
                 mean_depth_mse=float(true_depth.square().mean()),
             )

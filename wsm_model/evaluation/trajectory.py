@@ -1,16 +1,8 @@
-"""Errors of camera trajectories, and what a model must at least beat."""
+"""What a model's camera trajectory must at least beat."""
 
 import numpy as np
 
 from wsm_data.schema.arrays import Float64Array
-
-
-def ate_rmse_m(estimated_T3: Float64Array, true_T3: Float64Array) -> float:
-    """Absolute trajectory error: root of the mean squared distance of camera centres, m.
-
-    Both are metric and in the first camera's frame, so nothing is aligned.
-    """
-    return float(np.sqrt(np.square(estimated_T3 - true_T3).sum(-1).mean()))
 
 
 def zero_motion(true_T3: Float64Array) -> Float64Array:

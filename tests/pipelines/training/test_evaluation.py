@@ -49,8 +49,9 @@ def test_the_file_holds_every_clip_and_the_table_their_means(evaluated, tiny):
     flow = found.record["flow"]
     assert [" ".join(line.split()) for line in found.table.splitlines()] == [
         "mean over 2 held-out clips model beside it",
-        f"camera ATE, not aligned (m) {means['ate_m']:.3f} zero motion {means['zero_motion_ate_m']:.3f}, "
-        f"constant velocity {means['constant_velocity_ate_m']:.3f}",
+        f"camera ATE, not aligned (m) {means['ate_rmse_unaligned_m']:.3f} "
+        f"zero motion {means['ate_rmse_zero_motion_m']:.3f}, "
+        f"constant velocity {means['ate_rmse_constant_velocity_m']:.3f}",
         f"depth latents, squared error {means['depth_mse']:.3f} training mean {means['mean_depth_mse']:.3f}",
         f"flow matching {flow['model']:.3f} copy {flow['copy']:.3f}, unconditional {flow['unconditional']:.3f}",
     ]
@@ -58,7 +59,7 @@ def test_the_file_holds_every_clip_and_the_table_their_means(evaluated, tiny):
 
 def test_an_untrained_camera_stays_and_has_the_error_of_zero_motion(evaluated):
     for clip in evaluated().record["clips"]:
-        assert clip["ate_m"] == pytest.approx(clip["zero_motion_ate_m"], rel=1e-6)
+        assert clip["ate_rmse_unaligned_m"] == pytest.approx(clip["ate_rmse_zero_motion_m"], rel=1e-6)
 
 
 def test_the_same_model_and_clips_give_the_same_bytes(evaluated):
@@ -89,9 +90,14 @@ def test_without_slam_there_is_the_flow_alone(evaluated):
 
 def test_the_table_shows_what_it_was_given():
     error = ClipErrors(
-        key="a", ate_m=0.1, zero_motion_ate_m=1.0, constant_velocity_ate_m=2.0, depth_mse=0.25, mean_depth_mse=1.0
+        key="a",
+        ate_rmse_unaligned_m=0.1,
+        ate_rmse_zero_motion_m=1.0,
+        ate_rmse_constant_velocity_m=2.0,
+        depth_mse=0.25,
+        mean_depth_mse=1.0,
     )
-    table = evaluation_table([error, replace(error, ate_m=0.3, depth_mse=0.75)], FLOW, 2)
+    table = evaluation_table([error, replace(error, ate_rmse_unaligned_m=0.3, depth_mse=0.75)], FLOW, 2)
     assert table == (
         "mean over 2 held-out clips    model  beside it\n"
         "camera ATE, not aligned (m)   0.200  zero motion 1.000, constant velocity 2.000\n"

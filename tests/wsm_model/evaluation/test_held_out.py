@@ -45,7 +45,7 @@ def test_a_camera_that_stays_where_it_was_has_the_error_of_zero_motion(make_mode
     torch.nn.init.zeros_(head.linear_2.weight)
     head.linear_2.bias.data = torch.tensor([0.0, 0, 0, 1, 0, 0, 0])
     for one in clip_errors(model, batch, CONFIG):
-        assert one.ate_m == pytest.approx(one.zero_motion_ate_m, rel=1e-6)
+        assert one.ate_rmse_unaligned_m == pytest.approx(one.ate_rmse_zero_motion_m, rel=1e-6)
         assert one.mean_depth_mse == pytest.approx(1.0, abs=0.2)  # standard normal latents
 
 
@@ -55,8 +55,11 @@ def test_still_frames_that_were_added_do_not_count(make_model, batch):
     before = clip_errors(model, batch, CONFIG)
     batch.poses[:, 3:, :, :3] += 7.0
     for one, other in zip(before, clip_errors(model, batch, CONFIG), strict=True):
-        assert (one.ate_m, one.zero_motion_ate_m) == (other.ate_m, other.zero_motion_ate_m)
-        assert one.constant_velocity_ate_m == other.constant_velocity_ate_m
+        assert (one.ate_rmse_unaligned_m, one.ate_rmse_zero_motion_m) == (
+            other.ate_rmse_unaligned_m,
+            other.ate_rmse_zero_motion_m,
+        )
+        assert one.ate_rmse_constant_velocity_m == other.ate_rmse_constant_velocity_m
 
 
 def test_copying_is_exact_where_nothing_changes_and_the_unconditional_guess_is_right_on_average(make_model, batch):
