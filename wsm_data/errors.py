@@ -4,8 +4,19 @@
 unit and goes on. Anything else is a bug and ends the run with a traceback.
 """
 
+import re
 from collections.abc import Mapping
 from enum import StrEnum
+
+_CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
+
+
+def printable(text: str) -> str:
+    """Text that a terminal, a file and a table take: control characters and halves of surrogates as escapes.
+
+    Newlines and tabs stay. Names out of a source may hold anything, escape codes of a terminal among it.
+    """
+    return _CONTROL.sub(lambda match: match[0].encode("unicode_escape").decode(), text)
 
 
 class Reason(StrEnum):
@@ -14,11 +25,17 @@ class Reason(StrEnum):
     # containers: an archive, a scene folder, a trajectory folder
     ARCHIVE_POINTER_FILE = "archive.pointer_file"
     ARCHIVE_NOT_GZIP = "archive.not_gzip"
+    ARCHIVE_UNREAD_FORM = "archive.unread_form"  # surely data, as .7z, .zip or in parts
     ARCHIVE_TRUNCATED = "archive.truncated"
     ARCHIVE_CORRUPT = "archive.corrupt"
     ARCHIVE_UNSAFE_MEMBER = "archive.unsafe_member"
     FILE_UNREADABLE = "file.unreadable"  # the system refuses: a link that leads nowhere, no permission, a broken disk
     FILE_LINK_LOOP = "file.link_loop"
+    FILE_NOT_REGULAR = "file.not_regular"  # a pipe, a device or a socket
+    FILE_TOO_LARGE = "file.too_large"
+    CONTAINER_UNPARSABLE = "container.unparsable"  # what is in it makes a parser fail, or ask for too much memory
+    CONTAINER_UNSTORABLE_NAME = "container.unstorable_name"
+    CONTAINER_MISPLACED = "container.misplaced"
     CONTAINER_NO_EPISODES = "container.no_episodes"
     CONTAINER_SEVERAL_SCENES = "container.several_scenes"
 
@@ -26,6 +43,7 @@ class Reason(StrEnum):
     EPISODE_MISSING = "episode.missing"
     EPISODE_DUPLICATE = "episode.duplicate"
     EPISODE_TOO_SHORT = "episode.too_short"
+    EPISODE_TOO_LONG = "episode.too_long"
     EPISODE_UNSTORABLE_NAME = "episode.unstorable_name"
     EPISODE_LENGTH_MISMATCH = "episode.length_mismatch"  # a note: episodes.jsonl disagrees with what is stored
 
@@ -33,6 +51,7 @@ class Reason(StrEnum):
     FRAME_EMPTY = "frame.empty"
     FRAME_TRUNCATED = "frame.truncated"
     FRAME_UNDECODABLE = "frame.undecodable"
+    FRAME_TOO_LARGE = "frame.too_large"
     FRAME_MISSING = "frame.missing"
     FRAME_COUNT_MISMATCH = "frame.count_mismatch"
     FRAME_SIZE_MISMATCH = "frame.size_mismatch"
@@ -43,6 +62,7 @@ class Reason(StrEnum):
 
     # the parquet table of an episode
     TABLE_UNREADABLE = "table.unreadable"
+    TABLE_TOO_LARGE = "table.too_large"
     TABLE_MISSING_COLUMN = "table.missing_column"
     TABLE_ROW_COUNT = "table.row_count"
     TABLE_ROW_ORDER = "table.row_order"
@@ -85,6 +105,9 @@ class WsmError(Exception):
     """A foreseen failure. The message says what must hold, what was found, where, and what to do."""
 
     exit_code = 1
+
+    def __init__(self, message: str):
+        super().__init__(printable(message))
 
 
 class ConfigError(WsmError):
@@ -141,7 +164,7 @@ class DataError(WsmError):
     def __init__(self, reason: Reason, message: str, details: Mapping[str, object] | None = None):
         super().__init__(message)
         self.reason = reason
-        self.message = message
+        self.message = str(self)
         self.details = dict(details or {})
 
     def __reduce__(self) -> tuple[type["DataError"], tuple[Reason, str, dict[str, object]]]:

@@ -2,7 +2,7 @@
 
 from collections import Counter
 
-from wsm_data.readers.archive import gzip_stream, tar_walk
+from wsm_data.readers.archive import tar_stream, tar_walk
 
 
 def test_an_archive_is_opened_twice_in_a_run_and_nothing_is_unpacked(make_source, run_pipeline, tmp_path, monkeypatch):
@@ -10,9 +10,9 @@ def test_an_archive_is_opened_twice_in_a_run_and_nothing_is_unpacked(make_source
 
     def counting(path, where):
         opened[path.name] += 1
-        return gzip_stream.open_gzip(path, where)
+        return tar_stream.open_tar(path, where)
 
-    monkeypatch.setattr(tar_walk, "open_gzip", counting)
+    monkeypatch.setattr(tar_walk, "open_tar", counting)
     source = make_source(layout="scene_archive", cameras=("d435i",))
     run_pipeline(source, tmp_path / "run")
     assert opened == {"home_0001.tar.gz": 2}

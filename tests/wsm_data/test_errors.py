@@ -55,3 +55,8 @@ def test_reason_codes_are_distinct_dotted_words_that_match_their_names():
 
 def test_a_reason_is_written_as_its_code():
     assert str(Reason.ARCHIVE_POINTER_FILE) == "archive.pointer_file"
+
+
+def test_a_message_shows_names_that_a_terminal_must_not_see_as_escapes():
+    assert str(ConfigError("a\x1b[31m\udcff\u202eb\nc")) == "a\\x1b[31m\\udcff\\u202eb\nc"
+    assert DataError(Reason.FRAME_EMPTY, "\x07").message == "\\x07"

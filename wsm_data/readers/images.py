@@ -90,6 +90,22 @@ def _png_header(data: memoryview, where: str) -> tuple[int, int, int, int]:
     return width, height, bits, colour
 
 
+def require_pixels(size: tuple[int, int], max_pixels: int, where: str) -> None:
+    """Check the declared width and height of an image before anything decodes it.
+
+    Raises:
+        DataError: `frame.too_large`.
+    """
+    width, height = size
+    if width * height > max_pixels:
+        raise DataError(
+            Reason.FRAME_TOO_LARGE,
+            f"{where}: an image must have at most {max_pixels:,} pixels, and declares {width} x {height}; if it is "
+            "right, raise max_image_pixels in [limits] of the manifest",
+            {"width": width, "height": height, "limit": max_pixels},
+        )
+
+
 def _require_start(data: memoryview, start: bytes, kind: str, where: str) -> None:
     if len(data) == 0:
         raise DataError(Reason.FRAME_EMPTY, f"{where}: an image must not be empty, found 0 bytes; download it again")

@@ -106,7 +106,7 @@ def _parse_lines(lines: list[list[str]], body_start: int) -> PlyHeader:
         match words:
             case ["format", ("ascii" | "binary_little_endian" | "binary_big_endian") as kind, "1.0"]:
                 encoding = kind
-            case ["element", name, count] if count.isdecimal():
+            case ["element", name, count] if count.isdecimal() and len(count) < 20:
                 names.append(name)
                 counts.append(int(count))
                 properties.append([])

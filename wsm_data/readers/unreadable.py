@@ -1,8 +1,12 @@
 """Files that the system will not give: a loss of this container or frame, never the end of the run."""
 
 import errno
+import io
+import os
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 from wsm_data.errors import DataError, Reason
 
@@ -31,19 +35,62 @@ def refusing_unreadable(where: str) -> Iterator[None]:
         ) from error
 
 
-def read_file(path: str, where: str) -> bytes:
-    """All bytes of a file; for the many small ones of a scene, where building a `Path` takes as long as reading.
+@contextmanager
+def open_file(path: str | Path, where: str) -> Iterator[io.FileIO]:
+    """Open a plain file, unbuffered. A pipe or a device is refused without being opened: that could wait for ever.
 
     Args:
         path: the file.
         where: what to call it in messages.
 
     Raises:
-        DataError: `file.unreadable`.
+        DataError: `file.unreadable`, `file.not_regular`.
         OSError: as `refusing_unreadable`.
     """
-    with refusing_unreadable(where), open(path, "rb", buffering=0) as file:  # noqa: PTH123 - see above
+    with refusing_unreadable(where):
+        mode = os.stat(path).st_mode  # noqa: PTH116 - `Path` takes as long as reading a small file
+        if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):  # opening a folder says what is wrong by itself
+            raise DataError(
+                Reason.FILE_NOT_REGULAR,
+                f"{where} must be a plain file, and is a pipe, a device or a socket, or a link to one; remove it, and "
+                "fetch the file again",
+                {"mode": stat.filemode(mode)},
+            )
+        with open(path, "rb", buffering=0, opener=_without_waiting) as file:
+            yield file
+
+
+def _without_waiting(path: str, flags: int) -> int:
+    return os.open(path, flags | os.O_NONBLOCK)
+
+
+def read_file(path: str, where: str, max_bytes: int) -> bytes:
+    """All bytes of a file; for the many small ones of a scene, where building a `Path` takes as long as reading.
+
+    Args:
+        path: the file.
+        where: what to call it in messages.
+        max_bytes: larger ones are refused, unread.
+
+    Raises:
+        DataError: `file.unreadable`, `file.not_regular`, `file.too_large`.
+        OSError: as `refusing_unreadable`.
+    """
+    with open_file(path, where) as file:
+        size = os.fstat(file.fileno()).st_size
+        if size > max_bytes:
+            raise too_large(where, size, max_bytes)
         return file.read()
+
+
+def too_large(where: str, size: int, max_bytes: int) -> DataError:
+    """Refusal of a file of more bytes than the manifest allows."""
+    return DataError(
+        Reason.FILE_TOO_LARGE,
+        f"{where} must have at most {max_bytes:,} bytes, and has {size:,}; if it is right, raise the limit in "
+        "[limits] of the manifest",
+        {"bytes": size, "limit": max_bytes},
+    )
 
 
 def error_name(error: OSError) -> str:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 from wsm_data.schema.check_limits import CheckLimits
 from wsm_data.schema.depth import DepthEncoding
+from wsm_data.schema.read_limits import ReadLimits
 from wsm_data.schema.source.motion import Motion
 from wsm_data.schema.source.sequence_files import SequenceFiles
 
@@ -77,6 +78,7 @@ class DatasetManifest:
         motion: how the camera is carried, and which frames are kept.
         files: how the files of a sequence are named, for readers of sequences.
         checks: the other limits beyond which a trajectory is refused.
+        limits: what is too large to be read.
         min_frames: shorter trajectories are refused.
         expected_episodes: published number of episodes by group, to compare with what is found.
     """
@@ -95,6 +97,7 @@ class DatasetManifest:
     motion: Motion = field(default_factory=Motion)
     files: SequenceFiles = field(default_factory=SequenceFiles)
     checks: CheckLimits = field(default_factory=CheckLimits)
+    limits: ReadLimits = field(default_factory=ReadLimits)
     min_frames: int = 5
     expected_episodes: Mapping[str, int] = field(default_factory=dict)
 

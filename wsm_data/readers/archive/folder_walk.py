@@ -10,7 +10,12 @@ from wsm_data.readers.unreadable import read_file, refusing_unreadable
 
 
 def walk_folder(
-    root: Path, where: str, tops: Sequence[str], wanted: Callable[[str], bool], is_folder: Callable[[str], bool]
+    root: Path,
+    where: str,
+    tops: Sequence[str],
+    wanted: Callable[[str], bool],
+    is_folder: Callable[[str], bool],
+    max_bytes: int,
 ) -> Iterator[Member]:
     """Yield the wanted files below a folder, in sorted order within each of `tops`.
 
@@ -23,6 +28,7 @@ def walk_folder(
         tops: names in it that are looked at, in this order; those that are not there are passed over.
         wanted: of a name relative to `root`, with `/`: whether its content is asked for.
         is_folder: of such a name, whether it must be a folder: one that looks like a file cannot be reached.
+        max_bytes: larger files are members with a refusal, unread.
 
     Raises:
         DataError: `file.unreadable` when a folder cannot be listed or reached, `file.link_loop`.
@@ -32,16 +38,16 @@ def walk_folder(
     for top in (name for name in tops if name in present):
         for name in _names(root, top, where):
             if wanted(name):
-                yield file_member(f"{root}/{name}", name, f"{where}:{name}")
+                yield file_member(f"{root}/{name}", name, f"{where}:{name}", max_bytes)
             elif is_folder(name):
                 with refusing_unreadable(f"{where}:{name}"):
                     (root / name).stat()
 
 
-def file_member(path: str, name: str, where: str) -> Member:
+def file_member(path: str, name: str, where: str, max_bytes: int) -> Member:
     """A file as a member under the given name, with its content or the refusal of it."""
     try:
-        data = read_file(path, where)
+        data = read_file(path, where, max_bytes)
     except DataError as refusal:
         return Member(name, 0, memoryview(b""), refusal)
     return Member(name, len(data), memoryview(data))

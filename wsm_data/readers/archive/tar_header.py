@@ -8,10 +8,13 @@ from wsm_data.errors import DataError, Reason
 BLOCK_BYTES = 512
 ZERO_BLOCK = bytes(BLOCK_BYTES)
 
-_REGULAR = b"0\0"  # "0" in ustar, NUL before it
+_REGULAR = b"0\x007"  # "0" in ustar, NUL before it; "7" is a contiguous file, which nothing tells from another
 _FOLDER = b"5"
+_HARD_LINK = b"1"
+_LABELS = b"V", b"D"  # GNU: the name of the volume, and a list of names in a folder
 _LONG_NAME, _LONG_LINK, _PAX, _PAX_GLOBAL = b"L", b"K", b"x", b"g"
 _CHECKSUM = slice(148, 156)
+_MAX_DIGITS = 19  # of a number of 64 bits
 _ADLER_MODULUS = 65521
 
 
@@ -37,6 +40,16 @@ class TarHeader(NamedTuple):
     def is_folder(self) -> bool:
         """A folder, which holds no bytes."""
         return self.kind == _FOLDER or (self.kind in _REGULAR and self.name.endswith("/"))
+
+    @property
+    def is_label(self) -> bool:
+        """GNU: the name of the volume, or what a folder held when it was packed; nothing is read of it."""
+        return self.kind in _LABELS
+
+    @property
+    def is_hard_link(self) -> bool:
+        """A second name of a file that came before it."""
+        return self.kind == _HARD_LINK
 
     @property
     def is_long_name(self) -> bool:
@@ -89,8 +102,8 @@ def parse_pax(content: bytes, where: str) -> dict[str, str]:
     records, start = {}, 0
     while start < len(content):
         space = content.find(b" ", start)
-        length = content[start:space]
-        end = start + int(length) if space > 0 and length.isdigit() else 0
+        length = content[start:space] if space > 0 else b""
+        end = start + int(length) if 0 < len(length) <= _MAX_DIGITS and length.isdigit() else 0
         key, separator, value = content[space + 1 : end - 1].partition(b"=")
         if not separator or end > len(content) or content[end - 1 : end] != b"\n":
             raise DataError(Reason.ARCHIVE_CORRUPT, f"{where}: a pax record is malformed; download the archive again")

@@ -22,10 +22,21 @@ CONTENT_FOLDERS = ("data", "meta", "videos")
 SCENE_CLOUD = "meta/pointcloud.ply"
 """Where a scene keeps its cloud; trajectory folders without one of their own share it."""
 
+_DEEPEST_LEVEL = 8
+"""Nothing is read of a scene that lies in more folders than four."""
+
 EXPECTS = "<group>/<scene>.tar.gz, <group>/<scene>/data or <group>/<scene>/<trajectory>/data"
 """The three layouts as a person would look for them."""
 
-_ARCHIVE = re.compile(r"(?P<scene>.+?)\.(tar\.gz|tgz|tar|tar\.[a-z0-9]+|zip|gz)")
+_ENDING = r"tar\.(?:gz|zst|bz2|xz|lz4|lzma|lz|z|br)|tar|tgz|tzst|tbz2?|txz|tlz|zip|7z|rar|gz"
+_ARCHIVE = re.compile(rf"(?P<scene>.+?)\.(?:{_ENDING})", re.I)
+_PART = re.compile(
+    rf"(?P<scene>.+?)\.(?:(?:{_ENDING})[._-](?:[a-z]{{2}}|a(?!sc)[a-z]{{2}}|part[._-]?[a-z0-9]+|[0-9]{{1,4}})"
+    r"|[rz][0-9]{2})",
+    re.I,
+)
+"""What `split`, 7-Zip and others call the pieces of an archive: `.tar.gz.aa`, `.7z.001`, `.z01`."""
+
 _UNFINISHED = re.compile(
     r"(?P<whole>.+)\.(part|partial|incomplete|crdownload|download|opdownload|aria2|filepart)", re.I
 )
@@ -36,7 +47,8 @@ def find_containers(source: Path, dataset: DatasetManifest) -> list[Container]:
 
     `<group>/<scene>.tar.gz` is an archive, `<group>/<scene>/` a scene, and every further folder in it a trajectory.
     A folder that turns out to hold nothing is listed as well, so that it is refused by name and not passed over; so are
-    an archive of another kind, an unfinished download, and a link that leads nowhere. Hidden names are not looked at.
+    an archive of another kind, a piece of one, one at another depth, an unfinished download, and a link that leads
+    nowhere. Hidden names are not looked at.
     The same scene may stand there in several forms: each is a container.
 
     Raises:
@@ -48,7 +60,8 @@ def find_containers(source: Path, dataset: DatasetManifest) -> list[Container]:
             f"but {source} {'is a file' if source.exists() else 'does not exist'}"
         )
     try:
-        groups = [_entries(group) for group in _entries(source) if _is_folder(group)]
+        top = _entries(source)
+        groups = [_entries(group) for group in top if _is_folder(group)]
     except OSError as error:
         message = f"the source of data set {dataset.name!r} and its groups must be folders that can be listed"
         raise ConfigError(f"{message}, but {error.filename}: {error.strerror}") from error
@@ -58,6 +71,7 @@ def find_containers(source: Path, dataset: DatasetManifest) -> list[Container]:
             f"the source of data set {dataset.name!r} is empty: no <group>/<scene> folder and no "
             f"<group>/<scene>.tar.gz below {source}; the source is the folder that holds the groups"
         )
+    containers += [_archive(source, entry) for entry in top if _is_archive(entry)]
     return sorted(containers, key=lambda container: container.id)
 
 
@@ -78,11 +92,11 @@ class Place:
 
 def place_of(container: Container) -> Place:
     """Group, scene and trajectory of a container, as its path says."""
-    group, scene, *episode = container.id.split("/")
+    group, scene, *episode = container.id.split("/")  # archives at another depth are refused before
     if container.layout == Layout.SCENE_ARCHIVE:
         unfinished = _UNFINISHED.fullmatch(scene)
         whole = unfinished["whole"] if unfinished else scene
-        archive = _ARCHIVE.fullmatch(whole)
+        archive = _ARCHIVE.fullmatch(whole) or _PART.fullmatch(whole)
         scene = archive["scene"] if archive else whole
     return Place(group, scene, episode[0] if episode else None)
 
@@ -90,6 +104,11 @@ def place_of(container: Container) -> Place:
 def is_unfinished(name: str) -> bool:
     """Whether a file's name is one that programs give to downloads that are not complete."""
     return _UNFINISHED.fullmatch(name) is not None
+
+
+def is_part(name: str) -> bool:
+    """Whether a file's name is that of a piece of an archive that was split."""
+    return _ARCHIVE.fullmatch(name) is None and _PART.fullmatch(name) is not None
 
 
 def _entries(folder: Path | os.DirEntry[str]) -> list[os.DirEntry[str]]:
@@ -117,22 +136,35 @@ def _in_group(source: Path, entries: list[os.DirEntry[str]]) -> Iterator[Contain
     for entry in entries:
         if _is_folder(entry):
             yield from _in_scene(source, entry)
-        elif _ARCHIVE.fullmatch(entry.name) or is_unfinished(entry.name):
-            yield _container(source, entry, Layout.SCENE_ARCHIVE, [_file_line("", entry)])
+        elif _is_archive(entry):
+            yield _archive(source, entry)
         elif _leads_nowhere(entry):
             yield _container(source, entry, Layout.SCENE_FOLDER, [_file_line("", entry)])
         else:
             _log.warning("%s is neither a scene folder nor an archive; it is not read", entry.path)
 
 
+def _is_archive(entry: os.DirEntry[str]) -> bool:
+    name = entry.name
+    is_named = bool(_ARCHIVE.fullmatch(name) or _PART.fullmatch(name) or is_unfinished(name))
+    return is_named and not _is_folder(entry)
+
+
+def _archive(source: Path, entry: os.DirEntry[str]) -> Container:
+    return _container(source, entry, Layout.SCENE_ARCHIVE, [_file_line("", entry)])
+
+
 def _in_scene(source: Path, scene: os.DirEntry[str]) -> Iterator[Container]:
     try:
-        folders = [entry for entry in _entries(scene) if _is_folder(entry) or _leads_nowhere(entry)]
+        entries = _entries(scene)
     except OSError as error:  # listed all the same: reading it says why not
         yield _container(source, scene, Layout.SCENE_FOLDER, [error_name(error)])
         return
+    archives = [entry for entry in entries if _is_archive(entry)]
+    yield from (_archive(source, entry) for entry in archives)
+    folders = [entry for entry in entries if entry not in archives and (_is_folder(entry) or _leads_nowhere(entry))]
     trajectories = [entry for entry in folders if entry.name not in CONTENT_FOLDERS]
-    if not trajectories or any(entry.name in ("data", "videos") for entry in folders):
+    if not (trajectories or archives) or any(entry.name in ("data", "videos") for entry in folders):
         yield _container(source, scene, Layout.SCENE_FOLDER, _content_lines(scene))
     cloud = _scene_cloud_line(scene)
     for entry in trajectories:
@@ -151,20 +183,22 @@ def _content_lines(folder: os.DirEntry[str]) -> list[list[object]]:
         contents = [entry for entry in _entries(folder) if entry.name in CONTENT_FOLDERS]
     except OSError as error:
         return [[folder.name, error_name(error)]]
-    return [line for entry in contents for line in _lines("", entry)]
+    return [line for entry in contents for line in _lines("", entry, ())]
 
 
-def _lines(prefix: str, entry: os.DirEntry[str]) -> Iterator[list[object]]:
+def _lines(prefix: str, entry: os.DirEntry[str], above: tuple[int, ...]) -> Iterator[list[object]]:
+    """Lines of a file, or of all files below a folder; not of those in a folder that lies in itself, or deep down."""
     if not _is_folder(entry):
         yield _file_line(prefix, entry)
         return
     try:
-        entries = _entries(entry)
+        identity = entry.stat().st_ino
+        entries = [] if identity in above or len(above) > _DEEPEST_LEVEL else _entries(entry)
     except OSError as error:
         yield [f"{prefix}{entry.name}/", error_name(error)]
         return
     for inner in entries:
-        yield from _lines(f"{prefix}{entry.name}/", inner)
+        yield from _lines(f"{prefix}{entry.name}/", inner, (*above, identity))
 
 
 def _file_line(prefix: str, entry: os.DirEntry[str]) -> list[object]:

@@ -7,15 +7,18 @@ from pathlib import Path
 from wsm_data.errors import DataError, Reason
 from wsm_data.files.digest import xxh3_128
 from wsm_data.readers.archive.member import Member
-from wsm_data.readers.images import check_jpeg, check_png16
+from wsm_data.readers.images import check_jpeg, check_png16, require_pixels
 from wsm_data.readers.interndata.episode_meta import read_image_spans, read_lengths
 from wsm_data.readers.interndata.naming import ImageSpan, Kind, Role, role_of
 from wsm_data.readers.interndata.scene_files import iter_members, scene_cloud
 from wsm_data.readers.interndata.table import EpisodeTable, read_table
+from wsm_data.readers.interndata.unread import Unread
 from wsm_data.readers.ply import read_point_cloud, require_finite_points
 from wsm_data.readers.source import Container
+from wsm_data.readers.unreadable import too_large
 from wsm_data.schema.layout import Layout
 from wsm_data.schema.point_cloud import PointCloud
+from wsm_data.schema.read_limits import ReadLimits
 
 FrameKey = tuple[int | None, int]
 """Episode number and image number in an image's name; the first is None where names carry no episode."""
@@ -50,8 +53,12 @@ class FolderContents:
         spans: `image_index` of meta/episodes_stats.jsonl by episode number.
         clouds: by file name, the cloud or why it cannot be used.
         depth_png: bytes of the depth images that a map may be fused from.
+        limits: what is too large to be read.
+        unread: what else is in the container.
     """
 
+    limits: ReadLimits = field(default_factory=ReadLimits)
+    unread: Unread = field(default_factory=Unread)
     tables: dict[int, EpisodeTable | DataError] = field(default_factory=dict)
     rgb: dict[FrameKey, ImageFacts] = field(default_factory=dict)
     depth: dict[FrameKey, ImageFacts] = field(default_factory=dict)
@@ -65,8 +72,21 @@ class FolderContents:
 class Contents:
     """All of a container: its trajectory folders by name, where "" is the container itself."""
 
+    limits: ReadLimits = field(default_factory=ReadLimits)
     folders: dict[str, FolderContents] = field(default_factory=dict)
+    unread: Unread = field(default_factory=Unread)
     bytes_read: int = 0
+
+    def folder(self, name: str) -> FolderContents:
+        """The trajectory folder of that name, empty where it is new."""
+        return self.folders.setdefault(name, FolderContents(limits=self.limits, unread=self.unread))
+
+    def wants(self, name: str) -> bool:
+        """Whether a file is read; one that is not is counted."""
+        if role_of(name) is not None:
+            return True
+        self.unread.note(name)
+        return False
 
     @property
     def has_cloud(self) -> bool:
@@ -79,7 +99,7 @@ class Contents:
             folder.depth_png.clear()
 
 
-def read_contents(source: Path, container: Container, depth_sample_every: int) -> Contents:
+def read_contents(source: Path, container: Container, depth_sample_every: int, limits: ReadLimits) -> Contents:
     """Read a container once, from its first file to its last.
 
     Depth images are kept compressed until a cloud turns up, every `depth_sample_every`-th of them. Where their names
@@ -88,11 +108,11 @@ def read_contents(source: Path, container: Container, depth_sample_every: int) -
     Raises:
         DataError: the container as a whole cannot be used.
     """
-    contents = Contents()
-    for member in iter_members(source, container, lambda name: role_of(name) is not None):
+    contents = Contents(limits=limits)
+    for member in iter_members(source, container, contents.wants, limits.max_file_bytes):
         role = role_of(member.name)
         if role is not None:
-            folder = contents.folders.setdefault(role.folder, FolderContents())
+            folder = contents.folder(role.folder)
             _READ[role.kind](folder, role, member, f"{container.id}:{member.name}")
             contents.bytes_read += member.size
             if role.kind is Kind.DEPTH and not contents.has_cloud:
@@ -106,9 +126,9 @@ def read_contents(source: Path, container: Container, depth_sample_every: int) -
 
 def _take_scene_cloud(contents: Contents, source: Path, container: Container) -> None:
     """A trajectory without a cloud of its own has the cloud of its scene."""
-    cloud = scene_cloud(source, container)
+    cloud = scene_cloud(source, container, contents.limits.max_file_bytes)
     if cloud is not None:
-        folder = contents.folders.setdefault("", FolderContents())
+        folder = contents.folder("")
         _read_cloud(folder, _SCENE_CLOUD, cloud, f"{container.id}:{cloud.name}")
         contents.bytes_read += cloud.size
         contents.forget_depth()
@@ -133,7 +153,7 @@ def _read_table(folder: FolderContents, role: Role, member: Member, where: str) 
         )
         return
     try:
-        folder.tables[number] = read_table(member.content(), where)
+        folder.tables[number] = read_table(member.content(), where, folder.limits.max_frames)
     except DataError as error:
         folder.tables[number] = error
 
@@ -141,6 +161,7 @@ def _read_table(folder: FolderContents, role: Role, member: Member, where: str) 
 def _read_image(
     images: dict[FrameKey, ImageFacts],
     check: Callable[[memoryview, str], tuple[int, int]],
+    max_pixels: int,
     role: Role,
     member: Member,
     where: str,
@@ -151,7 +172,9 @@ def _read_image(
         if key in images:
             message = f"{where}: each frame must have one image, and {images[key].name} is the same frame; remove one"
             raise DataError(Reason.EPISODE_DUPLICATE, message, {"other": images[key].name})
-        size = check(member.content(), where)
+        declared = check(member.content(), where)
+        require_pixels(declared, max_pixels, where)
+        size = declared
     except DataError as error:
         refusal = error
     images[key] = ImageFacts(member.name, size, xxh3_128(member.data), refusal)
@@ -166,18 +189,24 @@ def _read_cloud(folder: FolderContents, _role: Role, member: Member, where: str)
         folder.clouds[member.name] = DataError(error.reason, f"{where}: {error.message}", error.details)
 
 
-def _read_lengths(folder: FolderContents, _role: Role, member: Member, _where: str) -> None:
-    folder.lengths.update(read_lengths(member.content()))
+def _read_lengths(folder: FolderContents, _role: Role, member: Member, where: str) -> None:
+    folder.lengths.update(read_lengths(_lines_of(folder, member, where)))
 
 
-def _read_spans(folder: FolderContents, _role: Role, member: Member, _where: str) -> None:
-    folder.spans.update(read_image_spans(member.content()))
+def _read_spans(folder: FolderContents, _role: Role, member: Member, where: str) -> None:
+    folder.spans.update(read_image_spans(_lines_of(folder, member, where)))
+
+
+def _lines_of(folder: FolderContents, member: Member, where: str) -> memoryview:
+    if member.size > folder.limits.max_json_bytes:
+        raise too_large(where, member.size, folder.limits.max_json_bytes)
+    return member.content()
 
 
 _READ: Mapping[Kind, Callable[[FolderContents, Role, Member, str], None]] = {
     Kind.TABLE: _read_table,
-    Kind.RGB: lambda folder, *rest: _read_image(folder.rgb, check_jpeg, *rest),
-    Kind.DEPTH: lambda folder, *rest: _read_image(folder.depth, check_png16, *rest),
+    Kind.RGB: lambda folder, *rest: _read_image(folder.rgb, check_jpeg, folder.limits.max_image_pixels, *rest),
+    Kind.DEPTH: lambda folder, *rest: _read_image(folder.depth, check_png16, folder.limits.max_image_pixels, *rest),
     Kind.CLOUD: _read_cloud,
     Kind.LENGTHS: _read_lengths,
     Kind.STATS: _read_spans,

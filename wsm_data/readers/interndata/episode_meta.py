@@ -9,6 +9,9 @@ from collections.abc import Iterator
 
 from wsm_data.readers.interndata.naming import ImageSpan
 
+_MAX_NUMBER = 10**18
+"""An episode or image number is below it; json reads integers of thousands of digits."""
+
 
 def read_lengths(data: memoryview) -> dict[int, int]:
     """`length` by episode number of meta/episodes.jsonl, where a line states both."""
@@ -41,7 +44,7 @@ def _episodes(data: memoryview) -> Iterator[tuple[int, dict[str, object]]]:
     for position, text in enumerate(line for line in bytes(data).splitlines() if line.strip()):
         try:
             line = json.loads(text)
-        except ValueError:
+        except (ValueError, RecursionError):  # RecursionError: brackets in brackets, a hundred thousand deep
             continue
         if isinstance(line, dict):
             number = _whole(line.get("episode_index", position))
@@ -53,5 +56,5 @@ def _whole(value: object) -> int | None:
     if isinstance(value, list) and len(value) == 1:
         return _whole(value[0])
     if isinstance(value, float) and value.is_integer():
-        return int(value)
-    return value if type(value) is int else None
+        value = int(value)
+    return value if type(value) is int and abs(value) < _MAX_NUMBER else None

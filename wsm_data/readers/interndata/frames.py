@@ -27,28 +27,31 @@ def iter_episode_frames(
         IntegrityError: the images are not those of the first pass: the source changed since.
         ValueError: a record belongs to another container.
     """
-    del dataset  # files are given as they are stored: no convention applies
     for record in records:
         if record.container != container.id:
             raise ValueError(f"{record.id.text} is in {record.container}, not in {container.id}")
     if container.layout == Layout.SCENE_ARCHIVE:
-        yield from _from_archive(source, container, records)
+        yield from _from_archive(source, container, records, dataset.limits.max_file_bytes)
     else:
-        yield from _from_folder(source / container.id, records)
+        yield from _from_folder(source / container.id, records, dataset.limits.max_file_bytes)
 
 
-def _from_folder(root: Path, records: Sequence[EpisodeRecord]) -> Iterator[tuple[EpisodeRecord, EpisodeFrames]]:
+def _from_folder(
+    root: Path, records: Sequence[EpisodeRecord], max_bytes: int
+) -> Iterator[tuple[EpisodeRecord, EpisodeFrames]]:
     for record in records:
         try:
-            rgb = tuple(read_file(f"{root}/{name}", f"{record.container}:{name}") for name in record.rgb_members)
-            depth = tuple(read_file(f"{root}/{name}", f"{record.container}:{name}") for name in record.depth_members)
+            rgb, depth = (
+                tuple(read_file(f"{root}/{name}", f"{record.container}:{name}", max_bytes) for name in names)
+                for names in (record.rgb_members, record.depth_members)
+            )
         except DataError as error:
             raise source_changed(record.container, error.message) from error
         yield record, verified_frames(record, rgb, depth)
 
 
 def _from_archive(
-    source: Path, container: Container, records: Sequence[EpisodeRecord]
+    source: Path, container: Container, records: Sequence[EpisodeRecord], max_bytes: int
 ) -> Iterator[tuple[EpisodeRecord, EpisodeFrames]]:
     owner = {name: record for record in records for name in (*record.rgb_members, *record.depth_members)}
     waiting = {record.id: 2 * record.frame_count for record in records}
@@ -56,9 +59,9 @@ def _from_archive(
     if not waiting:
         return
     try:
-        for member in iter_members(source, container, owner.__contains__):
+        for member in iter_members(source, container, owner.__contains__, max_bytes):
             record = owner[member.name]
-            held[member.name] = bytes(member.data)
+            held[member.name] = bytes(member.content())
             waiting[record.id] -= 1
             if waiting[record.id] == 0:
                 del waiting[record.id]

@@ -7,9 +7,10 @@ from enum import StrEnum
 
 from wsm_data.errors import DataError, Reason
 
-_TRAILING_NUMBER = re.compile(r"[0-9]+$")
+_TRAILING_NUMBER = re.compile(r"(?<![0-9])[0-9]{1,18}$")
 _CHUNK = r"chunk-[0-9]+"
-_IMAGE = r"(?:episode_(?P<episode>[0-9]+)_)?(?P<number>[0-9]+)"
+_NUMBER = r"[0-9]{1,18}"  # of 64 bits, and far above any count of files
+_IMAGE = rf"(?:episode_(?P<episode>{_NUMBER})_)?(?P<number>{_NUMBER})"
 
 
 class Kind(StrEnum):
@@ -26,9 +27,9 @@ class Kind(StrEnum):
 _PATTERNS = tuple(
     (kind, re.compile(rf"(?:(?P<folder>[^/]+)/)?{pattern}"))
     for kind, pattern in (
-        (Kind.RGB, rf"videos/{_CHUNK}/observation\.images\.rgb/{_IMAGE}\.jpe?g"),
-        (Kind.DEPTH, rf"videos/{_CHUNK}/observation\.images\.depth/{_IMAGE}\.png"),
-        (Kind.TABLE, rf"data/{_CHUNK}/episode_(?P<episode>[0-9]+)\.parquet"),
+        (Kind.RGB, rf"videos/{_CHUNK}/observation\.images\.rgb/{_IMAGE}\.(?i:jpe?g)"),
+        (Kind.DEPTH, rf"videos/{_CHUNK}/observation\.images\.depth/{_IMAGE}\.(?i:png)"),
+        (Kind.TABLE, rf"data/{_CHUNK}/episode_(?P<episode>{_NUMBER})\.(?i:parquet)"),
         (Kind.CLOUD, rf"meta/pointcloud\.ply|(?:(?P<folder2>[^/]+)/)?data/{_CHUNK}/path\.ply"),
         (Kind.LENGTHS, r"meta/episodes\.jsonl"),
         (Kind.STATS, r"meta/episodes_stats\.jsonl"),
@@ -89,7 +90,9 @@ def episode_name(folder: str) -> str:
     return f"{int(match[0]):06d}" if match else folder
 
 
-def frame_numbers(numbers: Iterable[int], first: int, last: int | None, where: str) -> list[int]:
+def frame_numbers(
+    numbers: Iterable[int], first: int, last: int | None, where: str, advice: str = "fetch the scene again"
+) -> list[int]:
     """The image numbers of one episode in time order, checked to have no gap.
 
     Args:
@@ -97,6 +100,7 @@ def frame_numbers(numbers: Iterable[int], first: int, last: int | None, where: s
         first: number of the episode's first image.
         last: number of its last image; None where only the images themselves say so.
         where: what to call them in messages.
+        advice: what to do where there is no image.
 
     Raises:
         DataError: `frame.missing` when there is no image, or one is absent before the last that is there. Images absent
@@ -104,16 +108,16 @@ def frame_numbers(numbers: Iterable[int], first: int, last: int | None, where: s
     """
     present = sorted(number for number in numbers if number >= first and (last is None or number <= last))
     if not present:
-        message = f"{where}: an episode needs images, found none; fetch the scene again"
+        message = f"{where}: an episode needs images, found none; {advice}"
         raise DataError(Reason.FRAME_MISSING, message, {"frames": 0})
-    wanted = range(first, present[-1] + 1)
-    if len(present) != len(wanted):
-        absent = sorted(set(wanted) - set(present))
+    absent = present[-1] + 1 - first - len(present)  # counted, not listed: a name may hold a time stamp
+    if absent:
+        first_absent = next(number for number, found in enumerate(present, first) if number != found)
         raise DataError(
             Reason.FRAME_MISSING,
-            f"{where}: images must be numbered {first} to {present[-1]} without a gap, but {len(absent)} are missing, "
-            f"the first is {absent[0]}; fetch the scene again",
-            {"missing": len(absent), "first_missing": absent[0]},
+            f"{where}: images must be numbered {first} to {present[-1]} without a gap, but {absent} are missing, "
+            f"the first is {first_absent}; fetch the scene again, or remove what is no image of it",
+            {"missing": absent, "first_missing": first_absent},
         )
     return present
 

@@ -9,7 +9,7 @@ from wsm_data.errors import DataError, Reason
 from wsm_data.geometry.camera import T_STORED_OPENCV
 from wsm_data.readers.frames_digest import digest_frames
 from wsm_data.readers.interndata.contents import FolderContents, FrameKey, ImageFacts
-from wsm_data.readers.interndata.naming import frame_numbers, scene_offset
+from wsm_data.readers.interndata.naming import Kind, frame_numbers, scene_offset
 from wsm_data.readers.interndata.table import EpisodeTable
 from wsm_data.schema.arrays import Float64Array
 from wsm_data.schema.camera import Intrinsics
@@ -61,16 +61,18 @@ def build_record(
     if table is None and not _has_images(folder, number):
         raise DataError(
             Reason.EPISODE_MISSING,
-            f"{where} is named by meta/episodes.jsonl and must have a table and images, found neither; fetch the scene "
-            "again",
+            f"{where} is named by meta/episodes.jsonl and must have a table and images, found neither; "
+            f"{folder.unread.advice(Kind.TABLE)}",
             {"episode": number},
         )
     if table is None:
-        message = f"{where} has images but no data/chunk-*/episode_{number:06d}.parquet; fetch the scene again"
+        message = f"{where} has images but no data/chunk-*/episode_{number:06d}.parquet; "
+        message += folder.unread.advice(Kind.TABLE)
         raise DataError(Reason.TABLE_UNREADABLE, message)
     if isinstance(table, DataError):
         raise table
     rgb, depth = _episode_images(folder, number, where)
+    _require_limit(len(rgb), dataset.limits.max_frames, where)
     size = _common_size([image for _, image in rgb], [image for _, image in depth], where)
     frames = _require_row_count(table, len(rgb), where)
     T_to_opencv = T_STORED_OPENCV[dataset.camera_axes]
@@ -89,6 +91,16 @@ def build_record(
         notes=(Reason.EPISODE_LENGTH_MISMATCH.value,) if folder.lengths.get(number, frames) != frames else (),
     )
     return record, [key for key, _ in depth]
+
+
+def _require_limit(frames: int, limit: int, where: str) -> None:
+    if frames > limit:
+        raise DataError(
+            Reason.EPISODE_TOO_LONG,
+            f"{where} must have at most {limit:,} images, and has {frames:,}; if it is right, raise max_frames in "
+            "[limits] of the manifest",
+            {"frames": frames, "limit": limit},
+        )
 
 
 def _has_images(folder: FolderContents, number: int) -> bool:
@@ -110,9 +122,9 @@ def _episode_images(
     """The colour and the depth images in time order, as many of one as of the other, each of them whole."""
     episode, first, last = _naming(folder, number, where)
     found = []
-    for kind, images in (("colour", folder.rgb), ("depth", folder.depth)):
+    for word, kind, images in (("colour", Kind.RGB, folder.rgb), ("depth", Kind.DEPTH, folder.depth)):
         candidates = [image for owner, image in images if owner == episode]
-        numbers = frame_numbers(candidates, first, last, f"{where}: {kind} images")
+        numbers = frame_numbers(candidates, first, last, f"{where}: {word} images", folder.unread.advice(kind))
         found.append([((episode, image), images[episode, image]) for image in numbers])
     rgb, depth = found
     if len(rgb) != len(depth):
@@ -142,7 +154,7 @@ def _naming(folder: FolderContents, number: int, where: str) -> tuple[int | None
     raise DataError(
         Reason.FRAME_MISSING,
         f"{where}: no image carries its number, and meta/episodes_stats.jsonl does not say which images of the scene "
-        "are its own; fetch the scene again",
+        f"are its own; {folder.unread.advice(Kind.RGB)}",
         {"episode": number, "episodes": len(folder.tables)},
     )
 

@@ -34,7 +34,7 @@ def scan_container(
         DataError: the container as a whole cannot be used: an `archive.*` reason, `container.several_scenes`,
             `container.no_episodes`, or `episode.duplicate` when a trajectory folder holds more than one episode.
     """
-    contents = read_contents(source, container, depth_sample_every)
+    contents = read_contents(source, container, depth_sample_every, dataset.limits)
     records: dict[str, EpisodeRecord] = {}
     refusals: dict[str, Refusal] = {}
     samples: dict[str, tuple[DepthSample, ...]] = {}
@@ -67,6 +67,13 @@ def _episodes(container: Container, contents: Contents) -> list[tuple[EpisodeId,
     for name, folder in sorted(contents.folders.items()):
         trajectory = place.episode if container.layout == Layout.TRAJECTORY_FOLDER else name
         numbers = episode_numbers(folder, in_trajectory=bool(trajectory), alone=len(contents.folders) == 1)
+        if name and len(numbers) > 1:
+            raise DataError(
+                Reason.CONTAINER_MISPLACED,
+                f"{container.id}: a scene must lie in one folder of its archive, as <scene>/data; {name} holds the "
+                f"episodes {numbers[:5]}, so it is a scene one level deeper; pack it anew from within its group",
+                {"folder": name, "episodes": numbers},
+            )
         if trajectory and len(numbers) > 1:
             raise DataError(
                 Reason.EPISODE_DUPLICATE,
@@ -80,8 +87,8 @@ def _episodes(container: Container, contents: Contents) -> list[tuple[EpisodeId,
         raise DataError(
             Reason.CONTAINER_NO_EPISODES,
             f"{container.id} must hold a scene or a trajectory (data/chunk-*/episode_*.parquet and images below "
-            "videos/), found no episode; remove or complete it, or correct the source: it is the folder that holds the "
-            f"groups, with {EXPECTS} below it",
+            f"videos/), found no episode, but {contents.unread.summary()}; remove or complete it, or correct the "
+            f"source: it is the folder that holds the groups, with {EXPECTS} below it",
         )
     return found
 

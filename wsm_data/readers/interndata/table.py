@@ -42,19 +42,20 @@ class EpisodeTable:
     T_world_stored: Float64Array
 
 
-def read_table(data: memoryview, where: str) -> EpisodeTable:
+def read_table(data: memoryview, where: str, max_rows: int) -> EpisodeTable:
     """Read the parquet file of an episode; matrices may be nested or flat.
 
     Args:
         data: the file's bytes.
         where: what to call it in messages.
+        max_rows: a table that declares more is refused before any of it is decoded.
 
     Raises:
-        DataError: `table.unreadable`, `table.missing_column`, `table.bad_shape`, `table.row_order` when there is an
-            index and it does not count the rows up by one, `pose.not_finite`, `pose.not_rigid`,
+        DataError: `table.unreadable`, `table.too_large`, `table.missing_column`, `table.bad_shape`, `table.row_order`
+            when there is an index and it does not count the rows up by one, `pose.not_finite`, `pose.not_rigid`,
             `intrinsics.misfit` or `mount.misfit` when they are not finite or change within the episode.
     """
-    table = _read_columns(data, where)
+    table = _read_columns(data, where, max_rows)
     if INDEX_COLUMN in table.column_names:
         _require_row_order(table, where)
     K = _matrices(table, INTRINSIC_COLUMN, 3, where)
@@ -70,13 +71,14 @@ def read_table(data: memoryview, where: str) -> EpisodeTable:
     return EpisodeTable(K=K[0], T_mount=T_mount[0], T_world_stored=T_world_stored)
 
 
-def _read_columns(data: memoryview, where: str) -> pa.Table:
+def _read_columns(data: memoryview, where: str, max_rows: int) -> pa.Table:
     columns = [INTRINSIC_COLUMN, MOUNT_COLUMN, POSE_COLUMN]
     try:
         with pq.ParquetFile(pa.BufferReader(data)) as file:
             present = file.schema_arrow.names
             absent = [column for column in columns if column not in present]
             wanted = [*columns, *({INDEX_COLUMN} & set(present))]
+            _require_size(file.metadata, wanted, where, max_rows)
             table = None if absent else file.read(columns=wanted, use_threads=False)
     except (pa.ArrowException, OSError) as error:
         message = f"{where}: must be a parquet file, and cannot be read ({error}); download it again"
@@ -90,6 +92,21 @@ def _read_columns(data: memoryview, where: str) -> pa.Table:
     if table.num_rows == 0:
         raise DataError(Reason.TABLE_BAD_SHAPE, f"{where}: must have a row for every frame, found none", {"rows": 0})
     return table
+
+
+def _require_size(metadata: pq.FileMetaData, wanted: list[str], where: str, max_rows: int) -> None:
+    """Compare what the footer declares, rows and values in nested lists, with what a table of matrices can hold."""
+    groups = [metadata.row_group(number) for number in range(metadata.num_row_groups)]
+    leaves = [group.column(number) for group in groups for number in range(group.num_columns)]
+    values = sum(leaf.num_values for leaf in leaves if leaf.path_in_schema.split(".")[0] in wanted)
+    most = max_rows * sum((9, 16, 16, 1))  # the matrices, and the index
+    if metadata.num_rows > max_rows or values > most:
+        raise DataError(
+            Reason.TABLE_TOO_LARGE,
+            f"{where}: a table must have at most {max_rows:,} rows and {most:,} values, and declares "
+            f"{metadata.num_rows:,} and {values:,}; if it is right, raise max_frames in [limits] of the manifest",
+            {"rows": metadata.num_rows, "values": values, "max_rows": max_rows},
+        )
 
 
 def _require_row_order(table: pa.Table, where: str) -> None:

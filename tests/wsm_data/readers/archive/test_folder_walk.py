@@ -12,7 +12,8 @@ def write(root, *names):
 
 
 def walk(root, tops=("a", "b"), wanted=lambda name: True, is_folder=lambda name: False):
-    return [(member.name, bytes(member.content())) for member in walk_folder(root, "scene", tops, wanted, is_folder)]
+    members = walk_folder(root, "scene", tops, wanted, is_folder, 10**6)
+    return [(member.name, bytes(member.content())) for member in members]
 
 
 def test_files_come_sorted_within_each_top_and_others_are_not_looked_at(tmp_path):
@@ -52,5 +53,5 @@ def test_a_folder_that_cannot_be_reached_is_refused_where_one_must_be(tmp_path):
 
 
 def test_a_file_that_cannot_be_read_is_a_member_with_a_refusal(tmp_path):
-    member = file_member(str(tmp_path / "gone"), "a/gone", "scene:a/gone")
+    member = file_member(str(tmp_path / "gone"), "a/gone", "scene:a/gone", 10**6)
     assert (member.size, member.refusal.reason) == (0, Reason.FILE_UNREADABLE)

@@ -27,7 +27,7 @@ def tar_of(files, kind="pax", **header):
 
 def walk(path, data, wanted=lambda name: True):
     path.write_bytes(data)
-    return {member.name: bytes(member.data) for member in walk_tar(path, "group/scene.tar.gz", wanted)}
+    return {member.name: bytes(member.data) for member in walk_tar(path, "group/scene.tar.gz", wanted, 10**9)}
 
 
 def reason_of(path, data):
@@ -97,9 +97,42 @@ def test_a_pointer_file_is_refused_by_name(tmp_path):
     assert reason_of(tmp_path / "a", pointer) is Reason.ARCHIVE_POINTER_FILE
 
 
-@pytest.mark.parametrize("data", [tar_of(FILES), b"PK\x03\x04 zip", b"<html>"])
-def test_what_is_not_gzip_is_refused(tmp_path, data):
-    assert reason_of(tmp_path / "a", data) is Reason.ARCHIVE_NOT_GZIP
+def test_what_is_named_gzip_and_is_not_is_refused(tmp_path):
+    assert reason_of(tmp_path / "a", b"<html>") is Reason.ARCHIVE_NOT_GZIP
+    assert reason_of(tmp_path / "a", b"PK\x03\x04 zip") is Reason.ARCHIVE_NOT_GZIP
+
+
+def test_a_member_above_the_limit_is_refused_and_passed_over_and_the_others_are_read(tmp_path):
+    path = tmp_path / "a"
+    path.write_bytes(gzip.compress(tar_of({"a/large": bytes(3000), "a/small": b"content"})))
+    large, small = ((one.refusal, bytes(one.data)) for one in walk_tar(path, "scene", lambda name: True, 2999))
+    assert (large[0].reason, large[0].details) == (Reason.FILE_TOO_LARGE, {"bytes": 3000, "limit": 2999})
+    assert small == (None, b"content")
+
+
+def test_a_volume_label_is_passed_over_and_a_hard_link_says_how_to_pack_anew(tmp_path):
+    def packed(kind):
+        buffer = io.BytesIO()
+        with tarfile.open(fileobj=buffer, mode="w") as tar:
+            other = tarfile.TarInfo("a/other")
+            other.type, other.linkname = kind, "a/b"
+            tar.addfile(other)
+            tar.addfile(tarfile.TarInfo("a/b"))
+        return buffer.getvalue()
+
+    assert list(walk(tmp_path / "a", packed(b"V"))) == ["a/b"]
+    with pytest.raises(DataError, match="--hard-dereference"):
+        walk(tmp_path / "a", packed(tarfile.LNKTYPE))
+
+
+@pytest.mark.parametrize("size", [b"9" * 5000, b"9" * 20])
+def test_a_pax_size_of_too_many_digits_is_corrupt(tmp_path, size):
+    record = b" size=" + size + b"\n"
+    record = str(len(record) + 4).encode().rjust(4, b"0") + record
+    header = tarfile.TarInfo("pax")
+    header.type, header.size = tarfile.XHDTYPE, len(record)
+    data = header.tobuf() + record + bytes(-len(record) % 512) + tar_of({"a": b""})
+    assert reason_of(tmp_path / "a", data) is Reason.ARCHIVE_CORRUPT
 
 
 def test_gzip_of_something_else_than_a_tar_is_corrupt(tmp_path):

@@ -180,3 +180,37 @@ def test_a_scene_that_cannot_be_listed_is_a_container_all_the_same(tmp_path, dat
     (tmp_path / "group" / "scene").mkdir(parents=True)
     refuse_listing(monkeypatch, "scene")
     assert list(find(tmp_path, dataset)) == ["group/scene"]
+
+
+@pytest.mark.parametrize(
+    ("name", "scene"),
+    [
+        ("home.tar.gz", "home"), ("home.TAR.GZ", "home"), ("home.tgz", "home"), ("home.tar.zst", "home"),
+        ("home.7z", "home"), ("home.tbz2", "home"), ("home.tar.gz.aa", "home"), ("home.tar.gz.part1", "home"),
+        ("home.7z.001", "home"), ("home.part02.rar", "home.part02"), ("home.zip.z01", "home.zip"),
+    ],
+)  # fmt: skip
+def test_whatever_is_surely_an_archive_is_a_container(tmp_path, dataset, name, scene):
+    path = tmp_path / "group" / name
+    path.parent.mkdir()
+    path.write_bytes(b"x")
+    (container,) = find_containers(tmp_path, dataset)
+    assert (container.id, place_of(container).scene) == (f"group/{name}", scene)
+
+
+@pytest.mark.parametrize("name", ["home.tar.gz.md5", "home.tar.gz.asc", "home.txt", "README"])
+def test_what_stands_beside_an_archive_is_none(tmp_path, dataset, name):
+    for each in (name, "home.tar.gz"):
+        path = tmp_path / "group" / each
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(b"x")
+    assert [container.id for container in find_containers(tmp_path, dataset)] == ["group/home.tar.gz"]
+
+
+def test_archives_at_another_depth_are_containers_beside_those_at_theirs(tmp_path, dataset):
+    for name in ("top.tar.gz", "group/home.tar.gz", "group/folder/deep.tar.gz"):
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(b"x")
+    found = [container.id for container in find_containers(tmp_path, dataset)]
+    assert found == ["group/folder/deep.tar.gz", "group/home.tar.gz", "top.tar.gz"]

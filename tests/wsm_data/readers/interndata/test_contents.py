@@ -7,7 +7,7 @@ from wsm_data.readers.interndata.contents import read_contents
 
 def contents_of(source, dataset, every=2):
     (container,) = find_containers(source, dataset)
-    return read_contents(source, container, every)
+    return read_contents(source, container, every, dataset.limits)
 
 
 def test_one_pass_keeps_facts_and_lets_the_images_go(build, tmp_path, dataset):

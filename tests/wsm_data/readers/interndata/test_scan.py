@@ -382,4 +382,4 @@ def test_a_folder_too_high_is_told_what_the_source_must_look_like(build, tmp_pat
     build.write_archive(tmp_path / "above", build.scene_files({0: build.episode(0)}))
     with pytest.raises(DataError, match=r"<group>/<scene>\.tar\.gz") as caught:
         scan_all()
-    assert caught.value.reason is Reason.CONTAINER_NO_EPISODES
+    assert caught.value.reason is Reason.CONTAINER_MISPLACED

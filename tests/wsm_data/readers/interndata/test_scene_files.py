@@ -10,7 +10,7 @@ from wsm_data.readers.interndata.scene_files import iter_members
 
 def members_of(source, dataset, wanted=lambda name: True):
     (container,) = find_containers(source, dataset)
-    return {member.name: bytes(member.data) for member in iter_members(source, container, wanted)}
+    return {member.name: bytes(member.data) for member in iter_members(source, container, wanted, 10**9)}
 
 
 def test_an_archive_and_a_folder_give_the_same_members(build, tmp_path, dataset):
@@ -133,3 +133,28 @@ def test_an_unfinished_download_is_refused_even_when_it_looks_whole(build, tmp_p
     error = refused(scan_all)
     assert error.reason is Reason.ARCHIVE_TRUNCATED
     assert "not finished" in error.message
+
+
+@pytest.mark.parametrize("prefix", ["gibson_d435i/Acker.ville/", "a/b/Acker.ville/", "gibson_d435i/renamed/"])
+def test_a_scene_that_lies_deeper_in_its_archive_is_read_under_its_own_id(build, tmp_path, scan_all, prefix):
+    files = build.scene_files({0: build.episode(0)})
+    path = build.write_archive(tmp_path, files)
+    path.write_bytes(build.archive({f"{prefix}{name}": data for name, data in files.items()}))
+    (scan,) = scan_all().values()
+    assert [record.id.text for record in scan.records] == ["gibson_d435i/Acker.ville/000000"]
+
+
+def test_a_scene_that_seems_to_be_a_trajectory_folder_is_said_to_lie_one_level_deeper(build, tmp_path, scan_all):
+    files = build.scene_files({0: build.episode(0), 1: build.episode(1)})
+    path = build.write_archive(tmp_path, files)
+    path.write_bytes(build.archive({f"other/folder/{name}": data for name, data in files.items()}))
+    error = refused(scan_all)
+    assert error.reason is Reason.CONTAINER_MISPLACED
+    assert "one level deeper" in error.message
+
+
+def test_names_with_backslashes_are_shown(build, tmp_path, scan_all):
+    files = build.scene_files({0: build.episode(0)})
+    path = build.write_archive(tmp_path, files)
+    path.write_bytes(build.archive({f"scene/{name}".replace("/", "\\"): data for name, data in files.items()}))
+    assert "backslashes" in refused(scan_all).message

@@ -11,7 +11,7 @@ from wsm_data.readers.interndata.table import INTRINSIC_COLUMN, MOUNT_COLUMN, PO
 
 def reason_of(data):
     with pytest.raises(DataError, match="episode 3") as caught:
-        read_table(memoryview(data), "episode 3")
+        read_table(memoryview(data), "episode 3", 10**6)
     return caught.value.reason
 
 
@@ -24,7 +24,7 @@ def parquet(**columns):
 @pytest.mark.parametrize("nested", [True, False])
 def test_nested_and_flat_matrices_are_the_same(build, nested):
     episode = build.episode(0)
-    table = read_table(memoryview(build.table(episode, nested=nested)), "a")
+    table = read_table(memoryview(build.table(episode, nested=nested)), "a", 10**6)
     assert np.array_equal(table.T_world_stored, episode.poses.astype(np.float64))
     assert np.array_equal(table.T_mount, episode.mount.astype(np.float64))
     assert np.array_equal(table.K, episode.K.astype(np.float64))
@@ -41,7 +41,7 @@ def test_fixed_size_large_and_double_lists_are_read_too(build):
             POSE_COLUMN: pa.chunked_array([pa.array(half.tolist()) for half in (poses[:3], poses[3:])]),
         }
     )
-    table = read_table(memoryview(data), "a")
+    table = read_table(memoryview(data), "a", 10**6)
     assert np.array_equal(table.T_world_stored, poses)
     assert np.array_equal(table.T_mount, mount)
     assert np.array_equal(table.K, K)
@@ -57,7 +57,7 @@ def test_a_damaged_table_is_unreadable(build, damage):
 @pytest.mark.parametrize("column", [INTRINSIC_COLUMN, MOUNT_COLUMN, POSE_COLUMN])
 def test_a_missing_column_is_named(build, column):
     with pytest.raises(DataError, match=f"{column} is missing") as caught:
-        read_table(memoryview(build.table(build.episode(0), drop=column)), "a")
+        read_table(memoryview(build.table(build.episode(0), drop=column)), "a", 10**6)
     assert caught.value.reason is Reason.TABLE_MISSING_COLUMN
     assert caught.value.details["missing"] == [column]
 
@@ -115,7 +115,7 @@ def test_a_matrix_that_is_not_rigid_is_refused_with_its_row(build, change):
     episode = build.episode(0)
     episode.poses[5] = change @ episode.poses[5]
     with pytest.raises(DataError) as caught:
-        read_table(memoryview(build.table(episode)), "a")
+        read_table(memoryview(build.table(episode)), "a", 10**6)
     assert (caught.value.reason, caught.value.details["row"]) == (Reason.POSE_NOT_RIGID, 5)
     mount = build.episode(0)
     mount.mount = (change @ mount.mount).astype(np.float32)
@@ -125,7 +125,7 @@ def test_a_matrix_that_is_not_rigid_is_refused_with_its_row(build, change):
 def test_rounding_to_float32_and_to_four_digits_counts_as_rigid(build):
     episode = build.episode(0)
     episode.poses = np.round(episode.poses, 4)  # R^T R is off by up to 4 * 0.5e-4 = 2e-4, the tolerance is 1e-3
-    assert len(read_table(memoryview(build.table(episode)), "a").T_world_stored) == 7
+    assert len(read_table(memoryview(build.table(episode)), "a", 10**6).T_world_stored) == 7
 
 
 def test_intrinsics_that_change_within_an_episode_are_refused(build):
@@ -147,7 +147,7 @@ def test_a_mount_that_changes_within_an_episode_is_refused(build):
 def test_rows_may_be_counted_from_any_number(build, start):
     episode = build.episode(0)
     data = build.table(episode, index=np.arange(start, start + 7))
-    assert len(read_table(memoryview(data), "a").T_world_stored) == 7
+    assert len(read_table(memoryview(data), "a", 10**6).T_world_stored) == 7
 
 
 @pytest.mark.parametrize(
@@ -156,13 +156,13 @@ def test_rows_may_be_counted_from_any_number(build, start):
 def test_rows_that_do_not_count_up_by_one_are_refused_with_the_row(build, index, row):
     data = build.table(build.episode(0), index=np.array(index))
     with pytest.raises(DataError, match=rf"row {row} has {index[row]} after {index[row - 1]}") as caught:
-        read_table(memoryview(data), "a")
+        read_table(memoryview(data), "a", 10**6)
     assert (caught.value.reason, caught.value.details["row"]) == (Reason.TABLE_ROW_ORDER, row)
 
 
 def test_a_table_without_an_index_is_taken_in_its_order(build):
     episode = build.episode(0)
-    table = read_table(memoryview(build.table(episode, drop="index")), "a")
+    table = read_table(memoryview(build.table(episode, drop="index")), "a", 10**6)
     assert np.array_equal(table.T_world_stored, episode.poses.astype(np.float64))
 
 

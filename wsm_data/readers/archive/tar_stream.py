@@ -1,35 +1,50 @@
-"""The decompressed bytes of a gzip file in one reused buffer: nothing is allocated or copied for each member."""
+"""The bytes of a tar, compressed or not, in one reused buffer: nothing is allocated or copied for each member."""
 
 import gzip
 import io
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import BinaryIO
+from typing import Protocol
 
+import pyarrow as pa
 from zlib_ng import gzip_ng, zlib_ng
 
 from wsm_data.errors import DataError, Reason
-from wsm_data.readers.unreadable import refusing_unreadable
+from wsm_data.readers.unreadable import open_file
 
 _BUFFER_BYTES = 1 << 19
 _GZIP_MAGIC = b"\x1f\x8b"
+_ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
+_TAR_MAGIC = b"ustar"
 _POINTER = b"version https://git-lfs"
 _OTHER_ARCHIVES = {
     b"PK": "zip",
     b"BZh": "bzip2",
     b"\xfd7zXZ": "xz",
-    b"\x28\xb5\x2f\xfd": "Zstandard",
+    b"Rar!": "RAR",
     b"7z\xbc\xaf": "7-Zip",
 }
 _TAR_MAGIC_AT = 257
 
+READ_FORMS = "a .tar, .tar.gz, .tgz or .tar.zst"
+PACK_ANEW = (
+    "unpack it into a folder <group>/<scene>, which is read as it is, or pack that anew with `tar -czf <scene>.tar.gz`"
+)
+"""What to do with an archive in another form."""
 
-class GzipStream:
-    """Sequential access to the content of a gzip file, several gzip members in a row included."""
 
-    def __init__(self, file: BinaryIO, where: str):
-        self._reader = _reader(file)
+class _Reader(Protocol):
+    """What fills a buffer; 0 at the end."""
+
+    def readinto(self, buffer: memoryview, /) -> int | None: ...
+
+
+class TarStream:
+    """Sequential access to a tar that `reader` decompresses."""
+
+    def __init__(self, reader: _Reader, where: str):
+        self._reader = reader
         self._where = where
         self._buffer = memoryview(bytearray(_BUFFER_BYTES))
         self._start = self._end = 0
@@ -58,7 +73,7 @@ class GzipStream:
             size -= len(self.take(min(size, _BUFFER_BYTES)))
 
     def rest(self) -> Iterator[memoryview]:
-        """What remains, in pieces; reading it to the end verifies the gzip checksum.
+        """What remains, in pieces; reading it to the end verifies the checksum of the compression.
 
         Raises:
             DataError: as `take`.
@@ -86,16 +101,31 @@ class GzipStream:
 
     def _read_into(self, target: memoryview) -> int:
         try:
-            return int(self._reader.readinto(target))
+            return self._reader.readinto(target) or 0
         except EOFError as error:
             reason, what = Reason.ARCHIVE_TRUNCATED, f"the gzip stream ends without its end marker ({error})"
         except (gzip.BadGzipFile, zlib_ng.error) as error:  # type: ignore[misc]
             reason, what = Reason.ARCHIVE_CORRUPT, f"the gzip stream is damaged ({error})"
+        except OSError as error:
+            if error.errno is not None:
+                raise  # the system's, not the decompressor's
+            cut = "Truncated" in str(error)
+            reason = Reason.ARCHIVE_TRUNCATED if cut else Reason.ARCHIVE_CORRUPT
+            what = f"the Zstandard stream is damaged ({error})"
         message = f"{self._where}: {what}, after {self.position} bytes of content; download it again"
         raise DataError(reason, message, {"position_bytes": self.position})
 
 
-def _reader(file: BinaryIO) -> io.RawIOBase | gzip_ng.GzipNGFile:
+def _reader(file: io.FileIO, head: bytes) -> _Reader | None:
+    """The reader of a tar by its first bytes; None where they are those of no form that is read."""
+    if head.startswith(_GZIP_MAGIC):
+        return _gzip_reader(file)
+    if head.startswith(_ZSTD_MAGIC):
+        return pa.CompressedInputStream(pa.PythonFile(file, "r"), "zstd")
+    return file if head[_TAR_MAGIC_AT:].startswith(_TAR_MAGIC) else None
+
+
+def _gzip_reader(file: io.FileIO) -> io.RawIOBase | gzip_ng.GzipNGFile:
     """The reader behind `gzip_ng.open`, taken directly: `GzipNGFile.readinto` reads into new bytes and copies them.
 
     It is not a public name, so that a zlib-ng without it is served by the public reader: the same bytes, slower.
@@ -105,18 +135,19 @@ def _reader(file: BinaryIO) -> io.RawIOBase | gzip_ng.GzipNGFile:
 
 
 @contextmanager
-def open_gzip(path: Path, where: str) -> Iterator[GzipStream]:
-    """Open a gzip file.
+def open_tar(path: Path, where: str) -> Iterator[TarStream]:
+    """Open a tar: plain, or compressed by gzip or Zstandard, as its first bytes say.
 
     Args:
         path: the file.
         where: what to call it in messages.
 
     Raises:
-        DataError: `archive.pointer_file`, `archive.truncated` for a file of no bytes, `archive.not_gzip`,
-            `file.unreadable`.
+        DataError: `archive.pointer_file`, `archive.truncated` for a file of no bytes, `archive.unread_form` for another
+            kind of archive, `archive.not_gzip` for one that is named as gzip, or none, `file.unreadable`,
+            `file.not_regular`.
     """
-    with refusing_unreadable(where), path.open("rb", buffering=0) as file:
+    with open_file(path, where) as file:
         head = file.read(len(_POINTER))
         if head == _POINTER:
             raise DataError(
@@ -124,24 +155,26 @@ def open_gzip(path: Path, where: str) -> Iterator[GzipStream]:
                 f"{where} must be an archive, but it is the text pointer that a clone without large-file support "
                 "leaves; fetch the file itself with `git lfs pull`",
             )
-        if head[:2] != _GZIP_MAGIC[: len(head)]:
-            raise _not_gzip(head + file.read(_TAR_MAGIC_AT + 5 - len(head)), where)
         if len(head) < len(_GZIP_MAGIC):
             raise DataError(Reason.ARCHIVE_TRUNCATED, f"{where} has {len(head)} bytes; download it again")
+        head += file.read(_TAR_MAGIC_AT + len(_TAR_MAGIC) - len(head))
         file.seek(0)
-        yield GzipStream(file, where)
+        reader = _reader(file, head)
+        if reader is None:
+            raise _unread(head, where)
+        yield TarStream(reader, where)
 
 
-def _not_gzip(head: bytes, where: str) -> DataError:
+def _unread(head: bytes, where: str) -> DataError:
     """Refusal of a file that is another kind of archive, or none."""
     kind = next((kind for start, kind in _OTHER_ARCHIVES.items() if head.startswith(start)), None)
-    if head[_TAR_MAGIC_AT:] == b"ustar":
-        kind = "uncompressed tar"
+    details = {"first_bytes": head[:2].hex(), "kind": kind}
     if kind is None:
-        message = f"{where} must be a gzip file and start with 1f 8b, found {head[:2].hex(' ')}; download it again"
-    else:
         message = (
-            f"{where} must be a .tar.gz, and is a {kind} archive: only .tar.gz archives are read; unpack it into a "
-            "folder <group>/<scene>, which is read as it is, or pack it anew with `tar -czf`"
+            f"{where} must be {READ_FORMS} and start with 1f 8b (gzip), 28 b5 2f fd (Zstandard) or a tar header, found "
+            f"{head[:4].hex(' ')}; download it again"
         )
-    return DataError(Reason.ARCHIVE_NOT_GZIP, message, {"first_bytes": head[:2].hex(), "kind": kind})
+        return DataError(Reason.ARCHIVE_NOT_GZIP, message, details)
+    message = f"{where} must be {READ_FORMS}, and is a {kind} archive; {PACK_ANEW}"
+    is_named_gzip = where.lower().endswith((".gz", ".tgz"))  # then the name is what is wrong
+    return DataError(Reason.ARCHIVE_NOT_GZIP if is_named_gzip else Reason.ARCHIVE_UNREAD_FORM, message, details)
