@@ -1,11 +1,10 @@
 """The conventions of a source, as its manifest under manifests/datasets/ states them."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 from wsm_data.schema.check_limits import CheckLimits
 from wsm_data.schema.depth import DepthEncoding
-from wsm_data.schema.read_limits import ReadLimits
 from wsm_data.schema.source.motion import Motion
 from wsm_data.schema.source.sequence_files import SequenceFiles
 
@@ -57,6 +56,30 @@ class CameraModel:
     fy: float | None = None
     cx: float | None = None
     cy: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReadLimits:
+    """What is refused unread, or undecoded: each limit is compared with what a file declares, before memory is taken.
+
+    Attributes:
+        max_frames: images of one trajectory, and rows of its table.
+        max_file_bytes: of any file that is read, after decompression. The largest of a scene is its cloud: 1 GiB is
+            70 million points.
+        max_json_bytes: of a file of JSON lines; parsed, they need ten times as much.
+        max_image_pixels: of an image, width times height.
+    """
+
+    max_frames: int = 100_000
+    max_file_bytes: int = 1 << 30
+    max_json_bytes: int = 1 << 24
+    max_image_pixels: int = 1 << 24
+
+    def __post_init__(self) -> None:
+        for limit in fields(self):
+            value = getattr(self, limit.name)
+            if value < 1:
+                raise ValueError(f"{limit.name} must be at least 1, found {value}")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from wsm_data.schema.dataset import DatasetManifest
+from wsm_data.schema.dataset import DatasetManifest, ReadLimits
 from wsm_data.schema.depth import DepthEncoding
 
 REQUIRED = {"name": "a", "licence": "CC-BY-4.0", "depth": DepthEncoding(metres_per_unit=1e-4, invalid_codes=(0, 65535))}
@@ -27,3 +27,9 @@ def test_the_robot_is_the_one_its_expert_planned_for():
 def test_obstacles_are_dark_blue_and_paths_black():
     cloud = DatasetManifest(**REQUIRED).cloud
     assert (cloud.obstacle_rgb, cloud.path_rgb, cloud.tolerance) == ((0.0, 0.0, 0.5), (0.0, 0.0, 0.0), 0.05)
+
+
+@pytest.mark.parametrize("name", ["max_frames", "max_file_bytes", "max_json_bytes", "max_image_pixels"])
+def test_a_limit_that_lets_nothing_through_is_refused(name):
+    with pytest.raises(ValueError, match=name):
+        ReadLimits(**{name: 0})
