@@ -9,9 +9,12 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from wsm_data.errors import DataError, Reason
+from wsm_data.schema.dataset import ReadLimits
 
 _NOT_THE_FILES_FAULT = frozenset((errno.ENOSPC, errno.EDQUOT, errno.EMFILE, errno.ENFILE, errno.ENOMEM))
 """A full disk, no more open files, no more memory: every other file would fail as well."""
+
+_MAX_FILE_BYTES = ReadLimits().max_file_bytes
 
 
 @contextmanager
@@ -64,13 +67,13 @@ def _without_waiting(path: str, flags: int) -> int:
     return os.open(path, flags | os.O_NONBLOCK)
 
 
-def read_file(path: str, where: str, max_bytes: int) -> bytes:
+def read_file(path: str, where: str, max_bytes: int = _MAX_FILE_BYTES) -> bytes:
     """All bytes of a file; for the many small ones of a scene, where building a `Path` takes as long as reading.
 
     Args:
         path: the file.
         where: what to call it in messages.
-        max_bytes: larger ones are refused, unread.
+        max_bytes: larger ones are refused, unread; the default is that of manifests.
 
     Raises:
         DataError: `file.unreadable`, `file.not_regular`, `file.too_large`.
