@@ -36,6 +36,9 @@ def test_a_served_planner_answers_and_ends_in_order(number):
         (["--planner", "oracle", "--port", "0"], "needs the map"),
         (["--planner", "reactive", "--port", "0"], "point-goal clients"),
         (["--planner", "nobody", "--port", "0"], "must be one of"),
+        (["--planner", "agent", "--port", "0"], "--model FOLDER belongs to --planner agent"),
+        (["--planner", "reactive", "--model", "m", "--port", "0"], "--model FOLDER belongs to --planner agent"),
+        (["--planner", "agent", "--model", "nowhere", "--port", "0"], "nowhere"),
     ],
 )
 def test_planners_that_cannot_be_served_are_refused_before_listening(words, reason):
