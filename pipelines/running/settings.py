@@ -6,14 +6,14 @@ from pathlib import Path
 
 from wsm_data.errors import ConfigError
 from wsm_data.files.json_values import to_json
-from wsm_data.files.typed_toml import INPUT, Word
+from wsm_data.files.typed_toml import INPUT, MAX_SECTIONS, Word
 
 
 def parse_assignments(assignments: Sequence[str]) -> dict[str, object]:
     """Turn `a.b=c` words into nested mappings of `Word`s.
 
     Raises:
-        ConfigError: a word has no `=` or an empty key.
+        ConfigError: a word has no `=`, an empty key, or more sections than any setting.
     """
     result: dict[str, object] = {}
     for assignment in assignments:
@@ -21,6 +21,10 @@ def parse_assignments(assignments: Sequence[str]) -> dict[str, object]:
         keys = path.strip().split(".")
         if not equals or not all(keys):
             raise ConfigError(f"--set takes key=value or section.key=value, found {assignment!r}")
+        if len(keys) > MAX_SECTIONS + 1:
+            raise ConfigError(
+                f"--set {path[:40]}... has {len(keys) - 1} sections; no setting lies deeper than {MAX_SECTIONS}"
+            )
         target = result
         for key in keys[:-1]:
             section = target.setdefault(key, {})

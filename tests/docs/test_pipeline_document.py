@@ -28,11 +28,12 @@ def test_every_stage_is_in_the_tour():
     assert [entry.name for entry in STAGES if f"`wsm {entry.name}`" not in tour] == []
 
 
-@pytest.mark.parametrize("page", [*PAGES, "docs/loaders.md"])
+@pytest.mark.parametrize("page", [*PAGES, "docs/loaders.md", "docs/closed_loop.md", "docs/sources.md"])
 def test_every_option_in_the_documentation_exists(page):
     text = (ROOT / page).read_text()
     options = set(re.findall(r"(?<![\w-])--[a-z][a-z-]+", text))
     commands = ("run", "inspect", "verify", "select", "audit", "audit-run", "bench loader")
+    commands += ("train", "eval nav", "eval slam", "serve", "source describe")
     helped = "".join(CliRunner().invoke(app, [*command.split(), "--help"]).output for command in commands)
     assert options - {one for one in options if one in helped} == set()
 

@@ -2,6 +2,7 @@
 
 import difflib
 import math
+import re
 import tomllib
 import types
 import typing
@@ -37,6 +38,12 @@ _EXACT = frozenset((str, int, bool))
 _TYPE_NAMES = {str: "text in quotes", int: "a whole number", float: "a number", bool: "true or false"}
 
 
+MAX_SECTIONS = 16
+"""Sections in one key, far more than any setting has."""
+
+_DEEP_KEY = re.compile(rf"""(?<![\w-])(?:(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){{{MAX_SECTIONS + 1}}}""")
+
+
 def load_toml(path: Path) -> dict[str, Any]:
     """Read a TOML file.
 
@@ -44,7 +51,12 @@ def load_toml(path: Path) -> dict[str, Any]:
         ConfigError: the file is absent or is not TOML.
     """
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8")
+        if _DEEP_KEY.search(
+            text
+        ):  # each dot is a table within a table: a line of them would take minutes and gigabytes
+            raise ConfigError(f"{path} has a key of more than {MAX_SECTIONS} sections; no setting lies that deep")
+        return tomllib.loads(text)
     except FileNotFoundError as error:
         raise ConfigError(f"configuration file {path} does not exist") from error
     except OSError as error:

@@ -71,3 +71,8 @@ def test_the_whole_config_holds_everything_and_paths_from_the_root(tmp_path, mon
     whole = config_json(Config(source=Path("tree")))
     assert whole["source"] == str(tmp_path / "tree")
     assert whole["grid"]["cache"] == str(tmp_path / "cache")
+
+
+def test_a_setting_deeper_than_any_is_refused_at_once():
+    with pytest.raises(ConfigError, match="has 100000 sections; no setting lies deeper than 16"):
+        parse_assignments(["a." * 100_000 + "b=1"])

@@ -185,3 +185,18 @@ def test_what_is_wrong_in_a_file_of_its_own_is_said_with_the_file(tmp_path):
     (tmp_path / "a.toml").write_text('source = "tree"\n[grid]\ncells = [8]\n')
     with pytest.raises(ConfigError, match=rf"^{tmp_path}/a\.toml: grid\.cells takes 2 values, found 1"):
         load_config(Config, tmp_path / "a.toml")
+
+
+@pytest.mark.parametrize("line", ["a." * 100_000 + "b = 1", "[" + "a . " * 100_000 + "b]", "'a'." * 100_000 + "b = 1"])
+def test_keys_deeper_than_any_setting_are_refused_at_once(tmp_path, line):
+    path = tmp_path / "deep.toml"
+    path.write_text(line)
+    with pytest.raises(ConfigError, match="more than 16 sections"):
+        load_toml(path)
+
+
+def test_arrays_nested_without_end_are_refused(tmp_path):
+    path = tmp_path / "deep.toml"
+    path.write_text("a = " + "[" * 100_000)
+    with pytest.raises(ConfigError, match=r"too deeply|not valid TOML"):
+        load_toml(path)
