@@ -2,13 +2,19 @@
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from math import inf, isfinite
+
+import numpy as np
 
 from wsm_data.errors import Reason
 from wsm_data.schema.identity import EpisodeId
+from wsm_data.schema.sequence import TEMPORAL_RATIO
 from wsm_data.shards.findings import Finding, FindingKind
 from wsm_data.shards.index import IndexTable
 from wsm_data.shards.inventory import InventoryRow, UnitState, count_reasons
 from wsm_data.shards.manifest import ReleaseManifest
+from wsm_data.shards.names import TRAIN_SPLIT
+from wsm_data.shards.statistics import STD_FLOOR
 
 
 def check_conservation(
@@ -44,6 +50,28 @@ def check_counts(manifest: ReleaseManifest, index: IndexTable, inventory: Sequen
     for name, (stated, found) in pairs.items():
         if stated != found:
             message = f"{name} must be {stated} as in dataset.json, found {found}; restore the files or pack again"
+            yield Finding(kind=FindingKind.COUNT, message=message)
+    yield from _statistics_of_the_training_split(manifest, index)
+
+
+def _statistics_of_the_training_split(manifest: ReleaseManifest, index: IndexTable) -> Iterator[Finding]:
+    """Latents are divided by these numbers: they must be of as many values as the index has, and can be divided by."""
+    codes, splits = index.codes("split")
+    names = ("frames", "padded_frames", "latent_height", "latent_width")
+    frames, padded, height, width = (index.numbers(name).astype(np.int64) for name in names)
+    real = 1 + (frames - 1) // TEMPORAL_RATIO - padded // TEMPORAL_RATIO
+    trained = codes == splits.index(TRAIN_SPLIT) if TRAIN_SPLIT in splits else np.zeros(len(codes), bool)
+    count = int((real * height * width)[trained].sum())
+    channels = manifest.codec.channels if count else 0
+    for name, found in (("rgb", manifest.rgb_statistics), ("depth", manifest.depth_statistics)):
+        whole = (len(found.mean), len(found.std), found.count) == (channels, channels, count)
+        if not whole or not all(map(isfinite, found.mean)) or not all(STD_FLOOR <= std < inf for std in found.std):
+            message = (
+                f"{name}_statistics must be finite, of {channels} channels and {count} values of the training split, "
+                f"and each deviation at least {STD_FLOOR}, found {len(found.mean)} means, {len(found.std)} deviations, "
+                f"{found.count} values, the least deviation {min(found.std, default=0)}; restore dataset.json or pack "
+                "again"
+            )
             yield Finding(kind=FindingKind.COUNT, message=message)
 
 

@@ -126,3 +126,22 @@ def test_a_clip_that_came_out_otherwise_than_it_went_in_is_found(
 def test_a_number_that_is_not_what_the_files_hold_is_found(books: SimpleNamespace, change: dict[str, object]) -> None:
     [finding] = check_counts(replace(books.manifest, **change), books.index, books.inventory)
     assert finding.kind == "release.count"
+
+
+@pytest.mark.parametrize("which", ["rgb_statistics", "depth_statistics"])
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda one: replace(one, std=(0.0, *one.std[1:])),
+        lambda one: replace(one, mean=(float("nan"), *one.mean[1:])),
+        lambda one: replace(one, mean=one.mean[:-1]),
+        lambda one: replace(one, std=one.std[:-1]),
+        lambda one: replace(one, count=one.count - 1),
+        lambda one: replace(one, count=0, mean=(), std=()),
+    ],
+)
+def test_statistics_that_latents_cannot_be_divided_by_are_found(books: SimpleNamespace, which: str, change) -> None:
+    manifest = replace(books.manifest, **{which: change(getattr(books.manifest, which))})
+    [finding] = check_counts(manifest, books.index, books.inventory)
+    assert str(finding.kind) == "release.count"
+    assert finding.message.startswith(f"{which} must be finite, of {books.manifest.codec.channels} channels")
