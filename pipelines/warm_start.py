@@ -21,6 +21,7 @@ from wsm_data.clips.scene_view import view_scene
 from wsm_data.codecs.clip_video import depth_video, rgb_video
 from wsm_data.codecs.dct import DctCodec
 from wsm_data.codecs.depth import valid_share
+from wsm_data.maps.near_surface import near_surface
 from wsm_data.maps.scene_map import build_scene_map
 from wsm_data.maps.voxels import voxels_from_cloud, voxels_from_depth
 from wsm_data.readers.ply import read_point_cloud
@@ -57,6 +58,7 @@ def _use_map_kernels() -> None:
     voxels = voxels_from_cloud(read_point_cloud(_cloud_file()), _DATASET.cloud)
     scene_map = build_scene_map(voxels, (0.0,), _DATASET.robot, max_height_m=1.0)
     view_scene(_record(), scene_map, _DATASET, ClipConfig())
+    near_surface(scene_map.levels[0], np.zeros((1, 3)))
 
 
 def _cloud_file() -> bytes:

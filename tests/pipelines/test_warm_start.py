@@ -33,7 +33,7 @@ def loaded():
 root = Path(sys.argv[1])
 (root / "box.toml").write_text(MANIFEST_TOML)
 write_folder(root / "source/box_d435i/hall", scene_files({0: along_x()}))
-write_folder(root / "source/box_d435i/den", scene_files({0: along_x()}, cloud=False))
+write_folder(root / "source/box_d435i/den", scene_files({0: along_x(y_m=2.4)}, cloud=False))
 before = loaded()
 configs = {
     "index": IndexConfig(source=root / "source", dataset=str(root / "box.toml"), depth_sample_every=2),

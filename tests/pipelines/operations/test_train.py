@@ -91,7 +91,7 @@ def test_other_settings_in_the_same_folder_are_refused(release, settings, tmp_pa
     wsm("train", release, "--out", str(out), "-c", settings, "--quiet")
     code, text = wsm("train", release, "--out", str(out), "-c", settings, "-s", "training.seed=5", "--quiet")
     assert code == 2
-    assert "training.seed: 0 in the checkpoint, 5 now" in text
+    assert "training.seed: 0 -> 5" in text
 
 
 def test_a_dry_run_says_sizes_and_writes_nothing(release, settings, tmp_path):

@@ -163,7 +163,7 @@ def test_changed_settings_are_refused_with_both_values(config, out, calls):
     before = content(out)
     calls()
     changed = replace(config, letters=Letters.UPPER, repeat=2)
-    with pytest.raises(ConfigError, match=r"letters: 'as_they_are' -> 'upper'\n  repeat: 1 -> 2\n"):
+    with pytest.raises(ConfigError, match=r'letters: "as_they_are" -> "upper"\n  repeat: 1 -> 2\n'):
         run_stage(COPY, changed, out, ANY)
     assert (calls(), content(out)) == ([], before)
 

@@ -138,7 +138,7 @@ def test_a_damaged_cloud_refuses_its_scene_with_the_readers_own_words(indexed):
 def test_a_scene_without_a_cloud_is_fused_or_refused_as_was_asked_for(indexed):
     indexed.run("map", without_cloud=WithoutCloud.REFUSE)
     assert indexed.refusals("map") == [(DEN, "cloud.missing")]
-    with pytest.raises(ConfigError, match="without_cloud: 'refuse' -> 'fuse'"):
+    with pytest.raises(ConfigError, match='without_cloud: "refuse" -> "fuse"'):
         indexed.run("map")
     shutil.rmtree(indexed.folder("map"))
     indexed.run("map")
