@@ -157,7 +157,6 @@ def _finish(config: IndexConfig, context: StageContext, settled: Settled) -> Fin
             kept = first.setdefault(row["id"], row)
             if kept is not row:
                 refusals.append(_duplicate(container, row, kept))
-    refusals += _take_out_same_content(first)
     rows = [row_from_json(row) for row in first.values()]
     write_episodes(context.out, rows)
     if not settled.pending:
@@ -195,28 +194,6 @@ def count_differences(found: Mapping[str, int], expected: Mapping[str, int]) -> 
     ]
 
 
-def _take_out_same_content(rows: dict[str, Mapping[str, object]]) -> list[Refusal]:
-    """Of trajectories with equal content under several ids, leave the one with the shortest id, the first of these."""
-    kept: dict[object, Mapping[str, object]] = {}
-    refusals = []
-    for name in sorted(rows, key=lambda one: (len(one), one)):
-        row = kept.setdefault(rows[name]["digest"], rows[name])
-        if row is not rows[name]:
-            refusals.append(_same_content(rows.pop(name), row))
-    return refusals
-
-
-def _same_content(row: Mapping[str, object], kept: Mapping[str, object]) -> Refusal:
-    return Refusal(
-        unit=str(row["id"]),
-        source=str(row["container"]),
-        reason=Reason.EPISODE_SAME_CONTENT,
-        message=f"{row['id']} has the images, poses and camera of {kept['id']} in {kept['container']}, and is left out:"
-        " the two could stand in training and test; remove one of them from the source",
-        details={"kept_in": kept["container"], "kept_as": kept["id"]},
-    )
-
-
 def _duplicate(container: str, row: Mapping[str, object], kept: Mapping[str, object]) -> Refusal:
     same = row["digest"] == kept["digest"]
     content = "the same content" if same else "other content"
@@ -232,7 +209,7 @@ def _duplicate(container: str, row: Mapping[str, object], kept: Mapping[str, obj
 
 STAGE = Stage(
     name="index",
-    version=4,
+    version=3,
     config_type=IndexConfig,
     list_units=_list_units,
     process=_process,
