@@ -55,19 +55,27 @@ def check_counts(manifest: ReleaseManifest, index: IndexTable, inventory: Sequen
 
 
 def _statistics_of_the_training_split(manifest: ReleaseManifest, index: IndexTable) -> Iterator[Finding]:
-    """Latents are divided by these numbers: they must be of as many values as the index has, and can be divided by."""
+    """Latents are divided by these numbers: they must be of the values of the index at least, and can be divided by.
+
+    A release that was copied out of another has the other's statistics, which are of more values.
+    """
     codes, splits = index.codes("split")
     names = ("frames", "padded_frames", "latent_height", "latent_width")
     frames, padded, height, width = (index.numbers(name).astype(np.int64) for name in names)
     real = 1 + (frames - 1) // TEMPORAL_RATIO - padded // TEMPORAL_RATIO
     trained = codes == splits.index(TRAIN_SPLIT) if TRAIN_SPLIT in splits else np.zeros(len(codes), bool)
     count = int((real * height * width)[trained].sum())
-    channels = manifest.codec.channels if count else 0
     for name, found in (("rgb", manifest.rgb_statistics), ("depth", manifest.depth_statistics)):
-        whole = (len(found.mean), len(found.std), found.count) == (channels, channels, count)
-        if not whole or not all(map(isfinite, found.mean)) or not all(STD_FLOOR <= std < inf for std in found.std):
+        channels = manifest.codec.channels if found.count else 0
+        whole = len(found.mean) == len(found.std) == channels
+        if (
+            found.count < count
+            or not whole
+            or not all(map(isfinite, found.mean))
+            or not all(STD_FLOOR <= std < inf for std in found.std)
+        ):
             message = (
-                f"{name}_statistics must be finite, of {channels} channels and {count} values of the training split, "
+                f"{name}_statistics must be finite, of {channels} channels and at least {count} values, "
                 f"and each deviation at least {STD_FLOOR}, found {len(found.mean)} means, {len(found.std)} deviations, "
                 f"{found.count} values, the least deviation {min(found.std, default=0)}; restore dataset.json or pack "
                 "again"

@@ -144,4 +144,4 @@ def test_statistics_that_latents_cannot_be_divided_by_are_found(books: SimpleNam
     manifest = replace(books.manifest, **{which: change(getattr(books.manifest, which))})
     [finding] = check_counts(manifest, books.index, books.inventory)
     assert str(finding.kind) == "release.count"
-    assert finding.message.startswith(f"{which} must be finite, of {books.manifest.codec.channels} channels")
+    assert finding.message.startswith(f"{which} must be finite, of ")
