@@ -42,6 +42,7 @@ class Reason(StrEnum):
     # episodes
     EPISODE_MISSING = "episode.missing"
     EPISODE_DUPLICATE = "episode.duplicate"
+    EPISODE_SAME_CONTENT = "episode.same_content"
     EPISODE_TOO_SHORT = "episode.too_short"
     EPISODE_TOO_LONG = "episode.too_long"
     EPISODE_UNSTORABLE_NAME = "episode.unstorable_name"

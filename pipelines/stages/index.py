@@ -4,6 +4,7 @@ import logging
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from enum import StrEnum
 from pathlib import Path
 
 from pipelines.artifacts.episode_table import (
@@ -20,6 +21,7 @@ from pipelines.running.settings import config_json
 from pipelines.running.stage import DONE, Finished, Outcome, Settled, Stage, StageContext, Unit, refused
 from wsm_data.checks.record import record_refusal
 from wsm_data.clips.scene_surface import scene_surface
+from wsm_data.curation.split import shortest_first
 from wsm_data.errors import DataError, Reason
 from wsm_data.files.digest import digest_json, sha256_file
 from wsm_data.files.json_values import to_json
@@ -36,6 +38,13 @@ from wsm_data.schema.verdict import Refusal
 _LOG = logging.getLogger(__name__)
 
 
+class SameContent(StrEnum):
+    """What becomes of trajectories with equal content under several names."""
+
+    REFUSE = "refuse"
+    TOGETHER = "together"
+
+
 @dataclass(frozen=True, kw_only=True)
 class IndexConfig:
     """Settings of `wsm index`.
@@ -46,11 +55,14 @@ class IndexConfig:
             is part of every unit's inputs, what it is called is not.
         depth_sample_every: where a scene has no cloud, every n-th depth frame is fused into its map, but for those of
             trajectories whose depth contradicts their poses; `encode` refuses these.
+        same_content: of trajectories with equal content under several names, `refuse` all but one; or keep all and
+            leave it to `split` to put them on one side, `together`.
     """
 
     source: Path = field(metadata=INPUT)
     dataset: str = field(default="interndata_n1", metadata=INPUT)
     depth_sample_every: int = 10
+    same_content: SameContent = SameContent.REFUSE
 
     def __post_init__(self) -> None:
         if self.depth_sample_every < 1:
@@ -157,6 +169,8 @@ def _finish(config: IndexConfig, context: StageContext, settled: Settled) -> Fin
             kept = first.setdefault(row["id"], row)
             if kept is not row:
                 refusals.append(_duplicate(container, row, kept))
+    if config.same_content is SameContent.REFUSE:
+        refusals += _take_out_same_content(first)
     rows = [row_from_json(row) for row in first.values()]
     write_episodes(context.out, rows)
     if not settled.pending:
@@ -194,6 +208,29 @@ def count_differences(found: Mapping[str, int], expected: Mapping[str, int]) -> 
     ]
 
 
+def _take_out_same_content(rows: dict[str, Mapping[str, object]]) -> list[Refusal]:
+    """Of trajectories with equal content under several ids, leave the one with the shortest id, the first of these."""
+    kept: dict[object, Mapping[str, object]] = {}
+    refusals = []
+    for name in sorted(rows, key=shortest_first):
+        row = kept.setdefault(rows[name]["digest"], rows[name])
+        if row is not rows[name]:
+            refusals.append(_same_content(rows.pop(name), row))
+    return refusals
+
+
+def _same_content(row: Mapping[str, object], kept: Mapping[str, object]) -> Refusal:
+    return Refusal(
+        unit=str(row["id"]),
+        source=str(row["container"]),
+        reason=Reason.EPISODE_SAME_CONTENT,
+        message=f"{row['id']} has the images, poses and camera of {kept['id']} in {kept['container']}, and is left out:"
+        " the two could stand in training and test; remove one of them from the source, or keep both on one side of the"
+        ' split with index.same_content="together"',
+        details={"kept_in": kept["container"], "kept_as": kept["id"]},
+    )
+
+
 def _duplicate(container: str, row: Mapping[str, object], kept: Mapping[str, object]) -> Refusal:
     same = row["digest"] == kept["digest"]
     content = "the same content" if same else "other content"
@@ -209,7 +246,7 @@ def _duplicate(container: str, row: Mapping[str, object], kept: Mapping[str, obj
 
 STAGE = Stage(
     name="index",
-    version=3,
+    version=4,
     config_type=IndexConfig,
     list_units=_list_units,
     process=_process,

@@ -8,7 +8,7 @@ from pipelines.artifacts.episode_table import EpisodeRow, read_episodes
 from pipelines.artifacts.split_table import SPLIT_FILE, write_split
 from pipelines.running.stage import Outcome, Stage, StageContext, Unit
 from pipelines.running.upstream import require_stage
-from wsm_data.curation.split import SplitBy, leaking_scenes, split_of
+from wsm_data.curation.split import SplitBy, leaking_scenes, split_together
 from wsm_data.files.digest import digest_json, sha256_file
 from wsm_data.files.typed_toml import INPUT
 
@@ -17,7 +17,7 @@ _UNIT = "split"
 
 @dataclass(frozen=True, kw_only=True)
 class SplitConfig:
-    """Settings of `wsm split`.
+    """Settings of `wsm split`. Trajectories of equal content go to one side (`index` keeps them if it is told to).
 
     Attributes:
         index: folder of `wsm index`.
@@ -39,13 +39,16 @@ class SplitConfig:
 def _list_units(config: SplitConfig) -> Sequence[Unit]:
     require_stage(config.index, "index")
     rows = read_episodes(config.index)
-    return [Unit(id=_UNIT, inputs={"episodes": digest_json([row.id.text for row in rows])}, payload=rows)]
+    first: dict[str, str] = {}
+    names = [(row.id.text, first.setdefault(row.digest, row.id.text)) for row in rows]  # and whose content they share
+    return [Unit(id=_UNIT, inputs={"episodes": digest_json(names)}, payload=rows)]
 
 
 def _process(batch: Sequence[Unit], config: SplitConfig, context: StageContext) -> Iterator[Outcome]:
     for unit in batch:
         rows: Sequence[EpisodeRow] = unit.payload
-        splits = {row.id: split_of(row.id, config.by, config.test_fraction, config.seed) for row in rows}
+        digests = {row.id: row.digest for row in rows}
+        splits = split_together(digests, config.by, config.test_fraction, config.seed)
         write_split(context.out, splits)
         tests = sum(split == "test" for split in splits.values())
         leaks = leaking_scenes(splits)

@@ -46,6 +46,16 @@ def _rewrite_table(scene: Path, change: Callable[[dict[str, list[object]]], obje
     pq.write_table(pa.table(columns), path)
 
 
+def _copy_under_another_name(good: Path, scene: Path) -> None:
+    """A copy whose pictures are the same and whose files are not: a comment with its name stands in their JPEGs."""
+    shutil.copytree(good, scene)
+    comment = scene.name.encode()
+    for episode in (0, 1):
+        path = _frames(scene, "rgb", episode)[0]
+        image = path.read_bytes()
+        path.write_bytes(image[:2] + b"\xff\xfe" + (len(comment) + 2).to_bytes(2, "big") + comment + image[2:])
+
+
 def _cut(path: Path) -> None:
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
 
@@ -235,12 +245,15 @@ def damaged(make_source, run_pipeline, tmp_path_factory):
     group.mkdir(parents=True)
     expected = {}
     for name, (damage, reason) in {**TRAJECTORY_DAMAGES, **CLOUD_DAMAGES}.items():
-        shutil.copytree(good, group / name)
+        _copy_under_another_name(good, group / name)
         damage(group / name)
         episodes = ("000000",) if name in TRAJECTORY_DAMAGES else ("000000", "000001")
         expected.update({f"{GROUP}/{name}/{episode}": reason for episode in episodes})
-    for name in ("home_0001", "length_doubled", "without_cloud"):
-        shutil.copytree(good, group / name)
+    shutil.copytree(good, group / "home_0001")
+    for name in ("length_doubled", "without_cloud"):
+        _copy_under_another_name(good, group / name)
+    shutil.copytree(good, group / "home_0001 (1)")  # as browsers name a second download
+    expected.update({f"{GROUP}/home_0001 (1)/{number}": "episode.same_content" for number in ("000000", "000001")})
     _double_length(group / "length_doubled")
     _cloud(group / "without_cloud").unlink()
     expected.update(_write_archives(good, group))

@@ -59,7 +59,7 @@ def test_a_changed_image_changes_its_own_trajectory_alone(mapped, changed):
 
 def test_a_trajectory_on_another_floor_changes_nothing_here(mapped, changed):
     before = mapped.inputs("encode")
-    keep_cloud(mapped, ZED, {1: along_x(room=UPSTAIRS)})
+    keep_cloud(mapped, ZED, {1: along_x(room=UPSTAIRS, y_m=1.2)})
     again(mapped)
     assert mapped.outcomes("map")[ZED].facts["floors"] == 2
     assert list(changed(before, mapped.inputs("encode"))) == [f"{ZED}/000001"]
@@ -188,7 +188,7 @@ def test_a_trajectory_whose_map_is_pending_is_not_listed_yet(make_pipeline):
 
 
 def test_of_a_trajectory_that_stands_twice_the_kept_one_is_the_unit(make_pipeline):
-    pipeline = make_pipeline({ZED: ({0: along_x()}, True), f"{ZED}.tar.gz": ({0: along_x(), 1: along_x()}, True)})
+    pipeline = make_pipeline({ZED: ({0: along_x()}, True), f"{ZED}.tar.gz": ({0: along_x(), 1: along_x(y_m=1.0)}, True)})
     pipeline.run_to("map")
     units = pipeline.units("encode")
     assert {name: unit.source for name, unit in units.items()} == {

@@ -72,7 +72,10 @@ def test_a_changed_convention_is_a_changed_input_of_every_container(make_pipelin
 
 
 def test_where_the_source_and_its_manifest_lie_is_no_setting():
-    assert settings_of(IndexConfig(source=Path("anywhere"), dataset="any.toml")) == {"depth_sample_every": 10}
+    assert settings_of(IndexConfig(source=Path("anywhere"), dataset="any.toml")) == {
+        "depth_sample_every": 10,
+        "same_content": "refuse",
+    }
 
 
 @pytest.mark.parametrize("every", [0, -1])

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wsm_data.curation.split import TEST, TRAIN, SplitBy, leaking_scenes, split_of
+from wsm_data.curation.split import TEST, TRAIN, SplitBy, leaking_scenes, split_of, split_together
 from wsm_data.schema.identity import EpisodeId
 
 NAMES = [
@@ -105,3 +105,20 @@ def test_scenes_on_both_sides_are_named_once_for_all_their_cameras():
 
 def test_nothing_leaks_between_sides_that_are_empty():
     assert leaking_scenes({}) == ()
+
+
+@given(
+    contents=st.lists(st.integers(0, 6), min_size=1, max_size=12), by=st.sampled_from(SplitBy), seed=st.integers(0, 99)
+)
+def test_equal_content_is_never_on_both_sides_and_content_that_is_there_once_stays(contents, by, seed):
+    """The reference merges sets of names until no two share a name or a content."""
+    digests = {EpisodeId("gibson_zed", f"s{n % 5}", f"{n:06d}"): str(one) for n, one in enumerate(contents)}
+    splits = split_together(digests, by, 0.5, seed)
+    groups = [{one} for one in digests]
+    name = (lambda one: one.physical_scene) if by is SplitBy.SCENE else (lambda one: one.text)
+    bound = lambda a, b: any(digests[x] == digests[y] or name(x) == name(y) for x in a for y in b)  # noqa: E731
+    while pair := next(((a, b) for a in groups for b in groups if a is not b and bound(a, b)), None):
+        groups = [one for one in groups if one not in pair] + [pair[0] | pair[1]]
+    for group in groups:
+        decides = min(group, key=lambda one: (len(name(one)), name(one)))
+        assert {splits[one] for one in group} == {split_of(decides, by, 0.5, seed)}
