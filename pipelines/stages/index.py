@@ -224,9 +224,9 @@ def _same_content(row: Mapping[str, object], kept: Mapping[str, object]) -> Refu
         unit=str(row["id"]),
         source=str(row["container"]),
         reason=Reason.EPISODE_SAME_CONTENT,
-        message=f"{row['id']} has the images, poses and camera of {kept['id']} in {kept['container']}, and is left out:"
-        " the two could stand in training and test; remove one of them from the source, or keep both on one side of the"
-        ' split with index.same_content="together"',
+        message=f"{row['id']} has the same content (images, poses, cameras) as {kept['id']} in {kept['container']}, and"
+        " is left out: the two could stand in training and test; remove one of them from the source, or keep"
+        ' both on one side of the split with index.same_content="together"',
         details={"kept_in": kept["container"], "kept_as": kept["id"]},
     )
 

@@ -188,7 +188,9 @@ def test_a_trajectory_whose_map_is_pending_is_not_listed_yet(make_pipeline):
 
 
 def test_of_a_trajectory_that_stands_twice_the_kept_one_is_the_unit(make_pipeline):
-    pipeline = make_pipeline({ZED: ({0: along_x()}, True), f"{ZED}.tar.gz": ({0: along_x(), 1: along_x(y_m=1.0)}, True)})
+    pipeline = make_pipeline(
+        {ZED: ({0: along_x()}, True), f"{ZED}.tar.gz": ({0: along_x(), 1: along_x(y_m=1.0)}, True)}
+    )
     pipeline.run_to("map")
     units = pipeline.units("encode")
     assert {name: unit.source for name, unit in units.items()} == {
