@@ -38,10 +38,9 @@ def chunk_start(latent: int, chunk_size: int) -> int:
     return 1 + (latent - 1) // chunk_size * chunk_size if latent else 0
 
 
-def chunk_numbers(length: int, chunk_size: int) -> Int64Array:
-    """Chunk of each latent of a sequence, int64 [F]: 0 for latent 0, 1 + (j - 1) // K after it."""
-    numbers: Int64Array = 1 + (np.arange(length) - 1) // chunk_size
-    numbers[:1] = 0
+def chunk_numbers(latent: Int64Array, chunk_size: Int64Array | int) -> Int64Array:
+    """Chunk of each latent j of its sequence: 0 for latent 0, 1 + (j - 1) // K after it."""
+    numbers: Int64Array = 1 + (latent - 1) // chunk_size  # -1 // K is -1
     return numbers
 
 
@@ -97,14 +96,25 @@ def frame_table(spans: Sequence[SequenceSpan], rows: int, latents: int) -> Frame
     Raises:
         ValueError: a sequence does not fit its row, or two overlap.
     """
-    sequence = np.full((rows, latents), NO_SEQUENCE)
-    latent, chunk = np.zeros((rows, latents), np.int64), np.zeros((rows, latents), np.int64)
-    for number, span in enumerate(spans):
-        if span.row >= rows or span.end > latents or (sequence[span.place] != NO_SEQUENCE).any():
-            raise ValueError(
-                f"sequence {number}, {span}, must have a place of its own in {rows} rows of {latents} latents"
-            )
-        sequence[span.place] = number
-        latent[span.place] = np.arange(span.length)
-        chunk[span.place] = chunk_numbers(span.length, span.chunk_size)
+    fields = [(span.row, span.start, span.length, span.chunk_size) for span in spans]
+    row, start, length, chunk_size = np.array(fields, np.int64).reshape(-1, 4).T
+    misfits = np.flatnonzero((row >= rows) | (start + length > latents))
+    if len(misfits):
+        raise _without_place(spans, misfits[0], rows, latents)
+    number = np.repeat(np.arange(len(spans)), length)
+    within = np.arange(len(number)) - np.repeat(np.cumsum(length) - length, length)
+    places = (row * latents + start)[number] + within
+    sequence = np.full(rows * latents, NO_SEQUENCE)
+    latent, chunk = np.zeros((2, rows * latents), np.int64)
+    sequence[places], latent[places], chunk[places] = number, within, chunk_numbers(within, chunk_size[number])
+    covered = np.flatnonzero(sequence[places] != number)
+    if len(covered):
+        raise _without_place(spans, number[covered[0]], rows, latents)
+    sequence, latent, chunk = (values.reshape(rows, latents) for values in (sequence, latent, chunk))
     return FrameTable(sequence=sequence, latent=latent, chunk=chunk)
+
+
+def _without_place(spans: Sequence[SequenceSpan], number: int, rows: int, latents: int) -> ValueError:
+    return ValueError(
+        f"sequence {number}, {spans[number]}, must have a place of its own in {rows} rows of {latents} latents"
+    )

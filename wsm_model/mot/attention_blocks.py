@@ -106,7 +106,7 @@ def attend_by_blocks(tokens: JointTokens, plan: Sequence[SequenceGroup]) -> Atte
 
 def _blocks(config: ModelConfig, length: int, chunk_sizes: list[int], device: torch.device) -> tuple[QueryBlock, ...]:
     latent = torch.arange(length)
-    chunk = torch.stack([torch.from_numpy(chunk_numbers(length, size)) for size in chunk_sizes])
+    chunk = torch.stack([torch.from_numpy(chunk_numbers(latent.numpy(), size)) for size in chunk_sizes])
     chunk = chunk[:1] if len(set(chunk_sizes)) == 1 else chunk
     found = []
     for kind in TokenKind:

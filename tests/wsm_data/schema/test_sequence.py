@@ -14,7 +14,7 @@ from wsm_data.schema.sequence import (
 @pytest.mark.parametrize("chunk_size", [1, 2, 3, 4])
 @pytest.mark.parametrize("length", [1, 2, 5, 9])
 def test_numbers_and_bounds_tell_the_same_chunks(length, chunk_size):
-    numbers = chunk_numbers(length, chunk_size).tolist()
+    numbers = chunk_numbers(np.arange(length), chunk_size).tolist()
     bounds = chunk_bounds(length, chunk_size)
     assert numbers == [number for number, (first, end) in enumerate(bounds) for _ in range(first, end)]
     assert [chunk_start(latent, chunk_size) for latent in range(length)] == [bounds[number][0] for number in numbers]

@@ -43,13 +43,15 @@ def sequences_of_rows(
         places: places of the clips of all rows.
         epoch_order: says how many latents are taken of each clip, and its chunk size.
     """
+    refs = np.concatenate(rows)
+    lengths = epoch_order.sequence_latents[refs].tolist()
+    sizes = chunk_sizes(refs, epoch_order.config, epoch_order.epoch).tolist()
     clips: list[BatchSequence] = []
-    for row, refs in enumerate(rows):
+    for row, row_refs in enumerate(rows):
         start = 0
-        sizes = chunk_sizes(refs, epoch_order.config, epoch_order.epoch).tolist()
-        for latents, size in zip(epoch_order.sequence_latents[refs].tolist(), sizes, strict=True):
-            span = SequenceSpan(row=row, start=start, length=latents, chunk_size=size)
-            clips.append(BatchSequence(place=places[len(clips)], span=span))
+        for number in range(len(clips), len(clips) + len(row_refs)):
+            span = SequenceSpan(row=row, start=start, length=lengths[number], chunk_size=sizes[number])
+            clips.append(BatchSequence(place=places[number], span=span))
             start = span.end
     return clips
 
