@@ -18,10 +18,10 @@ from wsm_data.files.tables import opened_table, read_statement, require_columns,
 from wsm_data.schema.arrays import Float64Array
 from wsm_data.shards.index import IndexTable
 
-ROLLOUTS_VERSION = 1
+ROLLOUTS_VERSION = 2
 _STATEMENT = "wsm.rollouts"
 _QUERY = ("key", "replan_latent", "policy")
-_NUMBERS = ("unsafe_share", "mean_cost_m2", "ate_m", "fm_loss")
+_NUMBERS = ("unsafe_share", "mean_cost_m2", "ate_rmse_sim3_m", "fm_loss")
 _SCHEMA = pa.schema(
     [
         ("key", pa.string()),
@@ -56,7 +56,7 @@ ROLLOUT_SCORES: tuple[ScorerInfo, ...] = (
         absent=f"{_NO_ROLLOUTS}, or no dream was safe",
     ),
     ScorerInfo(
-        name="rollout_ate_m",
+        name="rollout_ate_rmse_sim3_m",
         unit="m",
         direction=Direction.HIGHER,
         summary="absolute trajectory error (RMSE) of the SLAM expert after Sim(3) alignment, mean over queries",
@@ -128,7 +128,7 @@ def rollout_scores(rollouts: pa.Table, keys: pa.ChunkedArray) -> dict[str, Float
         aggregated["unsafe_share_mean"],
         np.where(np.isnan(never_safe), np.nan, never_safe == 1),
         aggregated["mean_cost_m2_mean"],
-        aggregated["ate_m_mean"],
+        aggregated["ate_rmse_sim3_m_mean"],
         aggregated["fm_loss_mean"],
     )
     return dict(zip((one.name for one in ROLLOUT_SCORES), values, strict=True))

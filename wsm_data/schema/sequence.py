@@ -110,8 +110,8 @@ def frame_table(spans: Sequence[SequenceSpan], rows: int, latents: int) -> Frame
     covered = np.flatnonzero(sequence[places] != number)
     if len(covered):
         raise _without_place(spans, number[covered[0]], rows, latents)
-    sequence, latent, chunk = (values.reshape(rows, latents) for values in (sequence, latent, chunk))
-    return FrameTable(sequence=sequence, latent=latent, chunk=chunk)
+    shape = (rows, latents)
+    return FrameTable(sequence=sequence.reshape(shape), latent=latent.reshape(shape), chunk=chunk.reshape(shape))
 
 
 def _without_place(spans: Sequence[SequenceSpan], number: int, rows: int, latents: int) -> ValueError:

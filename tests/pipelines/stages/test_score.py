@@ -106,7 +106,14 @@ def test_a_score_of_another_version_is_computed_again(score, monkeypatch):
 
 def write_rollouts(path, release, *rows):
     opened = open_release(release)
-    safe = {"replan_latent": 0, "policy": "a", "dreams": 4, "unsafe_share": 0.5, "mean_cost_m2": 1.0, "ate_m": 0.1}
+    safe = {
+        "replan_latent": 0,
+        "policy": "a",
+        "dreams": 4,
+        "unsafe_share": 0.5,
+        "mean_cost_m2": 1.0,
+        "ate_rmse_sim3_m": 0.1,
+    }
     records = [{**safe, "fm_loss": 2.0, **row} for row in rows]
     pq.write_table(pa.Table.from_pylist(records, schema=rollout_schema(release_digest(opened.manifest))), path)
     return str(path)

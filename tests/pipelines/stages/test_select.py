@@ -84,7 +84,14 @@ def test_a_rule_by_rollouts_that_were_never_made_says_to_evaluate_a_policy_first
 def test_with_few_rollouts_the_others_are_left_out_where_that_is_asked_for(select, release, tmp_path):
     opened = open_release(release)
     train = opened.index.columns(["key"]).filter(pc.equal(opened.index.columns(["split"])["split"], "train"))
-    row = {"replan_latent": 0, "policy": "a", "dreams": 4, "unsafe_share": 0.5, "mean_cost_m2": 1.0, "ate_m": 0.1}
+    row = {
+        "replan_latent": 0,
+        "policy": "a",
+        "dreams": 4,
+        "unsafe_share": 0.5,
+        "mean_cost_m2": 1.0,
+        "ate_rmse_sim3_m": 0.1,
+    }
     records = [{"key": train["key"][0].as_py(), **row, "fm_loss": 2.0}]
     schema = rollout_schema(release_digest(opened.manifest))
     pq.write_table(pa.Table.from_pylist(records, schema=schema), tmp_path / "rollouts.parquet")

@@ -23,7 +23,14 @@ def write(tmp_path, release):
     """Writes a table of rollouts by hand; values that are not given are those of a safe query."""
 
     def write(*rows, digest=None):
-        safe = {"policy": "a", "dreams": 16, "unsafe_share": 0.0, "mean_cost_m2": 0.1, "ate_m": 0.2, "fm_loss": 1.0}
+        safe = {
+            "policy": "a",
+            "dreams": 16,
+            "unsafe_share": 0.0,
+            "mean_cost_m2": 0.1,
+            "ate_rmse_sim3_m": 0.2,
+            "fm_loss": 1.0,
+        }
         table = pa.Table.from_pylist(
             [{**safe, **row} for row in rows], schema=rollout_schema(digest or release_digest(release.manifest))
         )
@@ -50,7 +57,7 @@ def scores_of(path, release):
 def test_scores_are_means_over_the_queries_of_all_policies(write, release, keys):
     path = write(
         {"key": keys[2], "replan_latent": 0, "unsafe_share": 0.25, "mean_cost_m2": 1.0},
-        {"key": keys[2], "replan_latent": 2, "unsafe_share": 1.0, "mean_cost_m2": None, "ate_m": 0.5},
+        {"key": keys[2], "replan_latent": 2, "unsafe_share": 1.0, "mean_cost_m2": None, "ate_rmse_sim3_m": 0.5},
         {"key": keys[2], "replan_latent": 0, "policy": "b", "unsafe_share": 0.25, "mean_cost_m2": 3.0, "fm_loss": 4.0},
         {"key": keys[0], "replan_latent": 1},
     )
@@ -61,7 +68,7 @@ def test_scores_are_means_over_the_queries_of_all_policies(write, release, keys)
             "rollout_unsafe_share": 0.5,
             "rollout_all_unsafe": 0.0,
             "rollout_mean_cost_m2": 2.0,  # of the queries with a safe dream
-            "rollout_ate_m": 0.3,
+            "rollout_ate_rmse_sim3_m": 0.3,
             "rollout_fm_loss": 2.0,
         }
     )
@@ -100,8 +107,8 @@ def test_unsafe_for_all_is_every_dream_of_every_query_of_every_policy(write, rel
         ({"mean_cost_m2": NAN}, "mean_cost_m2 must be a number of at least 0, found nan"),
         ({"mean_cost_m2": None}, "mean_cost_m2 must be null just where no dream is safe"),
         ({"unsafe_share": 1.0}, "mean_cost_m2 must be null just where no dream is safe"),
-        ({"ate_m": NAN}, "ate_m must be a number of at least 0"),
-        ({"ate_m": -1.0}, "ate_m must be a number of at least 0, found -1.0"),
+        ({"ate_rmse_sim3_m": NAN}, "ate_rmse_sim3_m must be a number of at least 0"),
+        ({"ate_rmse_sim3_m": -1.0}, "ate_rmse_sim3_m must be a number of at least 0, found -1.0"),
         ({"fm_loss": float("inf")}, "fm_loss must be a number of at least 0, found inf"),
         ({"fm_loss": None}, "fm_loss must be there"),
         ({"policy": None}, "policy must be there"),
@@ -133,8 +140,8 @@ def test_what_is_no_table_of_rollouts_is_told_from_what_is_not_there(tmp_path, r
     pq.write_table(stored.drop_columns(["fm_loss"]), path)
     with pytest.raises(IntegrityError, match='fm_loss: absent -> "double"'):
         read(path, release)
-    pq.write_table(stored.replace_schema_metadata({b"wsm.rollouts": json.dumps({"version": 2})}), path)
-    with pytest.raises(IntegrityError, match="version 1, found 2"):
+    pq.write_table(stored.replace_schema_metadata({b"wsm.rollouts": json.dumps({"version": 1})}), path)
+    with pytest.raises(IntegrityError, match="version 2, found 1"):
         read(path, release)
     path.write_bytes(b"PAR1 and then nothing")
     with pytest.raises(IntegrityError, match="must be a table of rollouts"):
