@@ -1,12 +1,14 @@
 """The four passes of inference, each one row of the mask's table evaluated against what was kept.
 
 A pass takes rows of different episodes together: each row has a history of its own, of any length, and several rows may
-share one, as dreams of one episode do. Only the attention goes row by row; a history is never copied for its rows.
+share one, as dreams of one episode do. Only the attention goes row by row. Tokens of a pass are written behind the
+history of their row and stay there until the next pass: the caller says whether they are kept.
 
-Shape suffixes: B rows, F frames of the pass, M pose slots, C channels, h rows and w columns of a latent.
+Shape suffixes: B rows, F frames of the pass, P tokens of a frame, M pose slots, C channels, h rows and w columns of a
+latent, H heads, d width of a head, L tokens.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import torch
@@ -14,7 +16,7 @@ from torch import Tensor
 from torch.nn.functional import scaled_dot_product_attention
 
 from wsm_model.config import Expert, Variant
-from wsm_model.inference.cache import FrameCache, KeysValues
+from wsm_model.inference.cache import History, KeysValues, Side, by_head
 from wsm_model.layers.pose import identity_poses
 from wsm_model.model import FLOW_TIME_SCALE
 from wsm_model.mot.attention import Attended, JointTokens
@@ -38,54 +40,53 @@ class States:
     poses: Tensor
 
 
-@dataclass(frozen=True)
-class History:
-    """Caches of clean RGB and clean state tokens of one episode."""
+@dataclass(frozen=True, kw_only=True)
+class Reach:
+    """What the tokens of a pass may see beside one another.
 
-    rgb: FrameCache
-    state: FrameCache
-
-
-def clean_rgb(model: MixtureOfTransformers, histories: Sequence[History], rgb: Tensor, firsts: Sequence[int]) -> Layers:
-    """Pass latents as clean RGB: each sees the clean RGB before it, and itself.
-
-    Args:
-        model: the model.
-        histories: of each row.
-        rgb: latents [B, F, C, h, w].
-        firsts: number of each row's first latent.
+    Attributes:
+        own: which side they stand on.
+        sides: of the history.
+        dreamed: clean RGB of the same frames, where it was dreamed.
+        is_causal: a frame does not see the frames of the pass that follow it.
     """
-    latents = rgb.unsqueeze(1)
+
+    own: Side
+    sides: frozenset[Side]
+    dreamed: Layers | None = None
+    is_causal: bool = False
+
+
+def clean_rgb(model: MixtureOfTransformers, histories: Sequence[History], rgb: Tensor) -> Layers:
+    """Pass the next latents [B, F, C, h, w] as clean RGB: each sees the clean RGB before it, and itself."""
+    latents, firsts = rgb.unsqueeze(1), [history.rgb.next for history in histories]
     stream = model.expert(Expert.GENERATION).stream(latents, _times(latents, 0.0), _numbers(latents, firsts), None)
-    return _run_clean(model, {Expert.GENERATION: stream}, [history.rgb for history in histories], firsts)
+    return _run_clean(model, histories, {Expert.GENERATION: stream}, Side.RGB)
 
 
-def clean_states(
-    model: MixtureOfTransformers, histories: Sequence[History], states: States, firsts: Sequence[int]
-) -> Layers:
-    """Pass states as clean depth and poses: each sees the clean states before it, and itself."""
+def clean_states(model: MixtureOfTransformers, histories: Sequence[History], states: States) -> Layers:
+    """Pass the states of the next latents as clean depth and poses: each sees those before it, and itself."""
+    firsts = [history.state.next for history in histories]
     streams = _state_streams(model, states, firsts, model.config.clean_state_time, None)
-    return _run_clean(model, streams, [history.state for history in histories], firsts)
+    return _run_clean(model, histories, streams, Side.STATE)
 
 
 def query_states(
     model: MixtureOfTransformers,
     histories: Sequence[History],
-    firsts: Sequence[int],
     frames: int,
     *,
     dreamed: Layers | None = None,
     context: Tensor | None = None,
 ) -> States:
-    """Estimate the states of one chunk of each row: `frames` latents.
+    """Estimate the states of the next chunk of each row: of `frames` latents after those whose states are kept.
 
     They see the clean RGB up to the chunk's end, the clean states before it, and one another.
 
     Args:
         model: the model.
-        histories: of each row; unless it is dreamed, the clean RGB of the chunk must be there.
-        firsts: number of the chunk's first latent, of each row.
-        frames: its length.
+        histories: of each row; unless it is dreamed, the clean RGB of the chunk is kept and none after it.
+        frames: length of the chunk.
         dreamed: clean RGB of the chunk, where it was dreamed.
         context: goal tokens [B, F, 1, D], only for the variant without SLAM.
     """
@@ -95,16 +96,10 @@ def query_states(
         rows, frames, config.latent_channels, config.latent_height, config.latent_width, device=device
     )
     asked = States(depth=latents, poses=identity_poses(rows, frames, config.pose_slots, device=device))
+    firsts = [history.state.next for history in histories]
     streams = _state_streams(model, asked, firsts, config.state_query_time, 0)
-
-    def before(layer: int, row: int) -> list[KeysValues]:
-        history, first = histories[row], firsts[row]
-        states = history.state.read(layer, first)
-        if dreamed is None:
-            return [*history.rgb.read(layer, first + frames), *states]
-        return [*history.rgb.read(layer, first), _row(dreamed[layer], row), *states]
-
-    done = model.run(streams, lambda layer, tokens: _gather(tokens, layer, before), context)
+    reach = Reach(own=Side.STATE, sides=frozenset(Side), dreamed=dreamed)
+    done = model.run(streams, lambda layer, tokens: _gather(tokens, layer, histories, reach), context)
     return States(
         depth=model.expert(Expert.DEPTH).read(done[Expert.DEPTH]) if Expert.DEPTH in done else None,
         poses=model.expert(Expert.POSE).read(done[Expert.POSE]),
@@ -112,52 +107,41 @@ def query_states(
 
 
 def velocity(
-    model: MixtureOfTransformers,
-    histories: Sequence[History],
-    noisy: Tensor,
-    flow_time: float,
-    firsts: Sequence[int],
-    context: Tensor,
+    model: MixtureOfTransformers, histories: Sequence[History], noisy: Tensor, flow_time: float, context: Tensor
 ) -> Tensor:
-    """Velocity of the noisy RGB latents of one chunk, [B, F, C, h, w], from all that is known before it.
+    """Velocity of the noisy RGB latents of the next chunk, [B, F, C, h, w], from all that is known before it.
 
     Args:
         model: the model.
         histories: of each row.
         noisy: x_tau, [B, F, C, h, w].
         flow_time: tau.
-        firsts: number of the chunk's first latent, of each row.
         context: goal tokens [B, F, 1, D].
     """
     expert = model.expert(Expert.GENERATION)
-    latents = noisy.unsqueeze(1)
+    latents, firsts = noisy.unsqueeze(1), [history.rgb.next for history in histories]
     stream = expert.stream(latents, _times(latents, flow_time * FLOW_TIME_SCALE), _numbers(latents, firsts), 0)
     sees_states = model.config.variant is Variant.SLAM
-
-    def before(layer: int, row: int) -> list[KeysValues]:
-        history, first = histories[row], firsts[row]
-        states = history.state.read(layer, first) if sees_states else []
-        return [*history.rgb.read(layer, first), *states]
-
-    done = model.run({Expert.GENERATION: stream}, lambda layer, tokens: _gather(tokens, layer, before), context)
+    reach = Reach(own=Side.RGB, sides=frozenset(Side) if sees_states else frozenset({Side.RGB}))
+    done = model.run(
+        {Expert.GENERATION: stream}, lambda layer, tokens: _gather(tokens, layer, histories, reach), context
+    )
     return expert.read(done[Expert.GENERATION])
 
 
 def _run_clean(
-    model: MixtureOfTransformers, streams: dict[Expert, Stream], caches: Sequence[FrameCache], firsts: Sequence[int]
+    model: MixtureOfTransformers, histories: Sequence[History], streams: dict[Expert, Stream], side: Side
 ) -> Layers:
     """Clean tokens over their own kind, each frame up to itself."""
-    kept: Layers = []
-
-    def before(layer: int, row: int) -> list[KeysValues]:
-        return caches[row].read(layer, firsts[row])
+    passed: Layers = []
+    reach = Reach(own=side, sides=frozenset({side}), is_causal=True)
 
     def attend(layer: int, tokens: JointTokens) -> Attended:
-        kept.append(_own(tokens))
-        return _gather(tokens, layer, before, is_causal=True)
+        passed.append(_own(tokens))
+        return _gather(tokens, layer, histories, reach)
 
     model.run(streams, attend, None)
-    return kept
+    return passed
 
 
 def _state_streams(
@@ -197,30 +181,47 @@ def _row(of_rows: KeysValues, row: int) -> KeysValues:
     return KeysValues(of_rows.keys[row], of_rows.values[row])
 
 
-def _gather(
-    tokens: JointTokens, layer: int, before: Callable[[int, int], list[KeysValues]], *, is_causal: bool = False
-) -> Attended:
-    """The tokens of each row attend to what is `before` them, by layer and row, and to one another.
-
-    Args:
-        tokens: of the experts that take part, [B, 1, F, P, H, d].
-        layer: number of the layer.
-        before: what a row sees beside its own tokens.
-        is_causal: a frame does not see the frames that follow it.
-    """
+def _gather(tokens: JointTokens, layer: int, histories: Sequence[History], reach: Reach) -> Attended:
+    """The tokens of each row, [B, 1, F, P, H, d] of each expert, attend to what is in reach and to one another."""
     own = _own(tokens)
-    frames, of_frame = own.keys.shape[1:3]
-    queries = [slice(frame, frame + 1) for frame in range(frames)] if is_causal else [slice(0, frames)]
-    found = {expert: torch.empty_like(part.queries) for expert, part in tokens.items()}
-    for row in range(len(own.keys)):
-        seen = [*before(layer, row), _row(own, row)]
-        keys, values = (torch.cat([part[i].flatten(0, 1) for part in seen]).transpose(0, 1) for i in range(2))
-        for place in queries:
-            end = keys.shape[1] - (frames - place.stop) * of_frame
-            for expert, part in tokens.items():
-                asked = part.queries[row, 0, place]
-                gathered = scaled_dot_product_attention(
-                    asked.flatten(0, 1).transpose(0, 1)[None], keys[None, :, :end], values[None, :, :end]
-                )
-                found[expert][row, 0, place] = gathered[0].transpose(0, 1).reshape(asked.shape)
-    return found
+    queries = torch.cat([part.queries[:, 0] for part in tokens.values()], dim=2)
+    frames = queries.shape[1]
+    stretches = [slice(frame, frame + 1) for frame in range(frames)] if reach.is_causal else [slice(0, frames)]
+    gathered = torch.empty_like(queries)
+    for row, history in enumerate(histories):
+        brought = {reach.own: _row(own, row)}
+        if reach.dreamed is not None:
+            brought[Side.RGB] = _row(reach.dreamed[layer], row)
+        find = _join_behind if own.keys.requires_grad else _write_behind
+        for place in stretches:
+            until = {side: _first(new, place.stop) for side, new in brought.items()}
+            keys, values = find(history, layer, reach.sides, until)
+            asked = queries[row, place]
+            found = scaled_dot_product_attention(by_head(asked)[None], keys[None], values[None])
+            gathered[row, place] = found[0].transpose(0, 1).reshape(asked.shape)
+    sizes = [part.queries.shape[3] for part in tokens.values()]
+    return dict(zip(tokens, gathered.unsqueeze(1).split(sizes, dim=3), strict=True))
+
+
+def _write_behind(
+    history: History, layer: int, sides: frozenset[Side], brought: Mapping[Side, KeysValues]
+) -> KeysValues:
+    """What is kept and what is brought, [H, L, d] each: a view of the history's memory."""
+    counts = {side: history.held(side) if side in sides else 0 for side in Side}
+    for side, new in brought.items():
+        history.write(layer, side, new)
+        counts[side] += len(new.keys)
+    return history.read(layer, counts[Side.RGB], counts[Side.STATE])
+
+
+def _join_behind(
+    history: History, layer: int, sides: frozenset[Side], brought: Mapping[Side, KeysValues]
+) -> KeysValues:
+    """The same as a copy: gradients flow through what is brought, which no later layer may write over."""
+    kept = history.read(layer, *(history.held(side) if side in sides else 0 for side in (Side.RGB, Side.STATE)))
+    parts = [kept, *(KeysValues(*(by_head(part) for part in new)) for new in brought.values())]
+    return KeysValues(*(torch.cat(part, dim=1) for part in zip(*parts, strict=True)))
+
+
+def _first(frames: KeysValues, end: int) -> KeysValues:
+    return KeysValues(frames.keys[:end], frames.values[:end])

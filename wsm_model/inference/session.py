@@ -12,10 +12,8 @@ from torch import Tensor
 
 from wsm_data.schema.sequence import chunk_start
 from wsm_model.config import Variant
-from wsm_model.inference.cache import FrameCache, KeysValues
+from wsm_model.inference.cache import History
 from wsm_model.inference.passes import (
-    History,
-    Layers,
     States,
     clean_rgb,
     clean_states,
@@ -56,11 +54,14 @@ class Episode:
 
     Attributes:
         history: keys and values of what was observed.
-        observed: latents observed so far.
     """
 
     history: History
-    observed: int = 0
+
+    @property
+    def observed(self) -> int:
+        """Latents observed so far."""
+        return self.history.rgb.next
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,10 +113,8 @@ class Session:
 
     def start(self) -> Episode:
         """An episode of which nothing was observed yet."""
-        layers, limit = self.model.config.layers, self.config.cache_latents
-        return Episode(history=History(rgb=FrameCache(layers, limit), state=FrameCache(layers, limit)))
+        return Episode(history=History(self.model.config, self.config.cache_latents, self.config.chunk_size))
 
-    @torch.no_grad()
     def observe(
         self, episodes: Sequence[Episode], rgb: Tensor, known: Sequence[StateEstimate | None] | None = None
     ) -> list[StateEstimate]:
@@ -136,17 +135,34 @@ class Session:
         Raises:
             ValueError: without SLAM, a latent after the anchor has no known poses.
         """
-        histories, numbers = [one.history for one in episodes], [one.observed for one in episodes]
-        for history in histories:
-            self._make_room(history)
-        passed = clean_rgb(self.model, histories, rgb.unsqueeze(1), numbers)
-        for row, episode in enumerate(episodes):
-            _keep(episode.history.rgb, passed, row, numbers[row])
-            episode.observed += 1
-        given = known or [None] * len(episodes)
-        states = self._estimates(histories, numbers) if self._is_slam else self._issued(numbers, given, rgb.device)
-        self._remember(histories, [own or state for own, state in zip(given, states, strict=True)])
-        return states
+        return self._take_in(episodes, rgb.unsqueeze(1), known or [None] * len(episodes))
+
+    def observe_all(self, episode: Episode, rgb_FChw: Tensor) -> StateEstimate:
+        """Take in the next latents of one episode, and estimate their states.
+
+        With the local backend a whole chunk is one step: what is estimated of it before its last latent would be
+        estimated again. While latents are dropped, it is one step a latent.
+
+        Returns:
+            States of the latents as they were estimated last, from the first of the current chunk on.
+
+        Raises:
+            ValueError: without SLAM, which estimates nothing of what it sees.
+        """
+        parts: list[StateEstimate] = []
+        while len(rgb_FChw):
+            frames = min(self._latents_at_once(episode), len(rgb_FChw))
+            (found,) = self._take_in([episode], rgb_FChw[None, :frames], [None])
+            if parts and parts[-1].first == found.first:
+                parts.pop()
+            parts.append(found)
+            rgb_FChw = rgb_FChw[frames:]
+        depth = [part.depth for part in parts if part.depth is not None]
+        return StateEstimate(
+            first=parts[0].first,
+            depth=torch.cat(depth) if depth else None,
+            poses=torch.cat([part.poses for part in parts]),
+        )
 
     @torch.no_grad()
     def dream(
@@ -161,22 +177,21 @@ class Session:
             schedule: flow times, from 1 to 0.
 
         Raises:
-            ValueError: nothing was observed yet.
+            ValueError: nothing was observed yet, or a dream is longer than a chunk.
         """
         if not all(one.observed for one in episodes):
             raise ValueError("a dream needs at least one observed latent; call observe first")
         dreams, frames = noise.shape[1:3]
-        rows = [one for one in episodes for _ in range(dreams)]
-        histories, firsts = [one.history for one in rows], [one.observed for one in rows]
+        histories = [one.history for one in episodes for _ in range(dreams)]
         goals = self.model.goal(goal_camera0_m).repeat_interleave(dreams, dim=0)
         context = goals[:, None, None].expand(-1, frames, -1, -1)
 
         def flow(x: Tensor, flow_time: float) -> Tensor:
-            return velocity(self.model, histories, x, flow_time, firsts, context)
+            return velocity(self.model, histories, x, flow_time, context)
 
         rgb = integrate(flow, noise.flatten(0, 1), list(schedule))
-        clean = clean_rgb(self.model, histories, rgb, firsts)
-        states = query_states(self.model, histories, firsts, frames, dreamed=clean, context=context)
+        clean = clean_rgb(self.model, histories, rgb)
+        states = query_states(self.model, histories, frames, dreamed=clean, context=context)
         found = []
         for number, episode in enumerate(episodes):
             own = slice(number * dreams, (number + 1) * dreams)
@@ -184,24 +199,50 @@ class Session:
             found.append(Dream(first=episode.observed, rgb=rgb[own], depth=depth, poses=states.poses[own]))
         return found
 
-    def _estimates(self, histories: Sequence[History], numbers: Sequence[int]) -> list[StateEstimate]:
-        size = self.config.chunk_size
-        firsts = [chunk_start(one, size) if self.config.local_backend else one for one in numbers]
+    @torch.no_grad()
+    def _take_in(
+        self, episodes: Sequence[Episode], rgb_NFChw: Tensor, known: Sequence[StateEstimate | None]
+    ) -> list[StateEstimate]:
+        """Observe latents that lie in one chunk of each episode."""
+        histories, frames = [one.history for one in episodes], rgb_NFChw.shape[1]
+        for history in histories:
+            history.state.forget_from(self._estimated_from(history.rgb.next))
+            history.make_room(frames)
+        clean_rgb(self.model, histories, rgb_NFChw)
+        for history in histories:
+            history.rgb.keep(frames)
+        states = self._estimates(histories) if self._is_slam else self._issued(histories, known, rgb_NFChw.device)
+        self._remember(histories, [own or state for own, state in zip(known, states, strict=True)])
+        return states
+
+    def _estimated_from(self, latent: int) -> int:
+        """The first latent whose states are estimated, again or for the first time, when a latent comes."""
+        return chunk_start(latent, self.config.chunk_size) if self._is_slam and self.config.local_backend else latent
+
+    def _latents_at_once(self, episode: Episode) -> int:
+        """How many of the next latents may be taken in as one step."""
+        first, limit = episode.observed, self.config.cache_latents
+        whole = chunk_start(first, self.config.chunk_size) + self.config.chunk_size - first if first else 1
+        fits = episode.history.rgb.held + whole <= limit
+        return whole if self._is_slam and self.config.local_backend and fits else 1
+
+    def _estimates(self, histories: Sequence[History]) -> list[StateEstimate]:
         found: dict[int, StateEstimate] = {}
-        for frames, rows in _alike([number + 1 - first for number, first in zip(numbers, firsts, strict=True)]):
-            own = [firsts[row] for row in rows]
-            states = query_states(self.model, [histories[row] for row in rows], own, frames)
+        for frames, rows in _alike([one.rgb.next - one.state.next for one in histories]):
+            own = [histories[row] for row in rows]
+            states = query_states(self.model, own, frames)
             for place, row in enumerate(rows):
                 depth = None if states.depth is None else states.depth[place]
-                found[row] = StateEstimate(first=own[place], depth=depth, poses=states.poses[place])
-        return [_anchored(found[row]) for row in range(len(numbers))]
+                found[row] = StateEstimate(first=own[place].state.next, depth=depth, poses=states.poses[place])
+        return [_anchored(found[row]) for row in range(len(histories))]
 
     def _issued(
-        self, numbers: Sequence[int], known: Sequence[StateEstimate | None], device: torch.device
+        self, histories: Sequence[History], known: Sequence[StateEstimate | None], device: torch.device
     ) -> list[StateEstimate]:
         anchor = identity_poses(1, self.model.config.pose_slots, device=device)
         found = []
-        for number, own in zip(numbers, known, strict=True):
+        for history, own in zip(histories, known, strict=True):
+            number = history.state.next
             if own is None and number:
                 raise ValueError(
                     f"latent {number} needs the poses that were issued for it: without SLAM none are estimated"
@@ -218,15 +259,20 @@ class Session:
                 depth=torch.stack(depth) if len(depth) == len(chosen) else None,
                 poses=torch.stack([one.poses for one in chosen]),
             )
-            firsts, own = [one.first for one in chosen], [histories[row] for row in rows]
-            passed = clean_states(self.model, own, joined, firsts)
-            for place, history in enumerate(own):
-                _keep(history.state, passed, place, firsts[place])
+            own = [histories[row] for row in rows]
+            for history, state in zip(own, chosen, strict=True):
+                _require_next(history, state)
+            clean_states(self.model, own, joined)
+            for history in own:
+                history.state.keep(len(chosen[0].poses))
 
-    def _make_room(self, history: History) -> None:
-        if history.state.held == self.config.cache_latents:
-            history.rgb.drop_oldest()
-            history.state.drop_oldest()
+
+def _require_next(history: History, state: StateEstimate) -> None:
+    wanted, found = (history.state.next, history.rgb.next), (state.first, state.first + len(state.poses))
+    if wanted != found:
+        raise ValueError(
+            f"states of the latents {wanted[0]} to {wanted[1] - 1} are to be remembered, found from {found}"
+        )
 
 
 def _anchored(estimate: StateEstimate) -> StateEstimate:
@@ -243,8 +289,3 @@ def _alike(values: Sequence[int]) -> list[tuple[int, list[int]]]:
     for place, value in enumerate(values):
         places[value].append(place)
     return list(places.items())
-
-
-def _keep(cache: FrameCache, passed: Layers, row: int, first: int) -> None:
-    for layer, (keys, values) in enumerate(passed):
-        cache.write(layer, first, KeysValues(keys[row], values[row]))

@@ -1,75 +1,85 @@
-"""Frames of keys and values, kept and dropped."""
+"""Frames of keys and values, kept and dropped, and read as one stretch of memory."""
 
 import pytest
 import torch
 
-from wsm_model.inference.cache import FrameCache, KeysValues
+from wsm_model.inference.cache import History, KeysValues, Places, Side
 
 
-def frame(number: int) -> KeysValues:
-    """One frame, its keys filled with its number: [1, P, H, d]."""
-    keys = torch.full((1, 3, 2, 4), float(number))
+def frames(first: int, count: int, tokens: int) -> KeysValues:
+    """Frames whose keys are filled with their numbers: [F, P, H, d]."""
+    keys = torch.arange(first, first + count).float()[:, None, None, None].expand(count, tokens, 2, 12).clone()
     return KeysValues(keys, -keys)
 
 
-def numbers(cache: FrameCache, layer: int, before: int) -> list[float]:
-    """Which frames a layer holds below `before`."""
-    return [number for part in cache.read(layer, before) for number in part.keys[:, 0, 0, 0].tolist()]
+def numbers(history: History, layer: int, rgb: int, states: int) -> list[float]:
+    """Which frames a layer holds, one number a token; states are told from RGB by 100 more."""
+    keys, values = history.read(layer, rgb, states)
+    assert torch.equal(keys, -values)
+    return sorted(keys[0, :, 0].tolist())
 
 
-def filled(layers: int, limit: int, frames: int) -> FrameCache:
-    cache = FrameCache(layers, limit)
-    for number in range(frames):
-        if cache.held == limit:
-            cache.drop_oldest()
-        for layer in range(layers):
-            cache.write(layer, number, frame(number))
-    return cache
+def push(history: History, config, frame: int) -> None:
+    """Keep one more frame of either side."""
+    history.make_room(1)
+    for layer in range(config.layers):
+        history.write(layer, Side.RGB, frames(frame, 1, 6))
+        history.write(layer, Side.STATE, frames(100 + frame, 1, 10))
+    history.rgb.keep(1)
+    history.state.keep(1)
 
 
-def test_frames_are_read_as_they_were_written_in_every_layer():
-    cache = filled(2, 5, 4)
-    assert numbers(cache, 0, 4) == numbers(cache, 1, 4) == [0, 1, 2, 3]
-    assert numbers(cache, 1, 2) == [0, 1]
-    assert numbers(cache, 0, 0) == []
-    assert all(torch.equal(keys, -values) for keys, values in cache.read(0, 4))
+def test_what_is_kept_of_either_side_and_of_both_is_one_view_of_memory_for_the_limit_and_one_pass(config):
+    """A frame has 6 RGB tokens, and 6 + 4 of state; the memory never grows."""
+    history = History(config, limit=5, spare=2)
+    for frame in range(12):
+        push(history, config, frame)
+        kept = [0, *range(max(1, frame - 3), frame + 1)]
+        for layer in range(config.layers):
+            assert numbers(history, layer, history.rgb.held, 0) == [one for one in kept for _ in range(6)]
+            assert numbers(history, layer, 0, history.state.held) == [100 + one for one in kept for _ in range(10)]
+            both = numbers(history, layer, history.rgb.held, history.state.held)
+            assert len(both) == len(kept) * 16
+        read = history.read(0, history.rgb.held, history.state.held).keys
+        assert read.untyped_storage().nbytes() == (5 + 2) * 16 * 2 * 12 * 4
+    assert history.rgb.next == history.state.next == 12
 
 
-def test_a_full_cache_drops_the_oldest_but_the_anchor_however_often():
-    cache = filled(1, 4, 100)
-    assert numbers(cache, 0, 100) == [0, 97, 98, 99]
-    assert (cache.held, cache.dropped) == (4, 96)
+def test_frames_that_are_written_and_not_kept_stand_at_the_ends_and_are_written_over(config):
+    history = History(config, limit=5, spare=2)
+    push(history, config, 0)
+    history.write(0, Side.RGB, frames(7, 2, 6))
+    history.write(0, Side.STATE, frames(107, 2, 10))
+    keys = history.read(0, 3, 3).keys[0, :, 0].tolist()
+    assert keys == [8.0] * 6 + [7.0] * 6 + [0.0] * 6 + [100.0] * 10 + [107.0] * 10 + [108.0] * 10
+    history.write(0, Side.RGB, frames(9, 1, 6))
+    assert numbers(history, 0, 2, 0) == [0.0] * 6 + [9.0] * 6
 
 
-def test_a_frame_can_be_written_again():
-    cache = filled(1, 5, 3)
-    cache.write(0, 1, frame(7))
-    assert numbers(cache, 0, 3) == [0, 7, 2]
+def test_frames_that_are_forgotten_can_be_kept_again():
+    places = Places(5)
+    places.keep(4)
+    places.forget_from(2)
+    assert (places.numbers, places.next) == ([0, 1], 2)
+    places.keep(3)
+    assert places.numbers == [0, 1, 2, 3, 4]
 
 
-def test_frames_are_read_in_the_order_of_time_from_memory_of_their_number():
-    for frames in range(1, 20):
-        cache = filled(1, 6, frames)
-        for before in range(max(1, frames - 5), frames + 1):
-            if before > cache.dropped:
-                wanted = [0, *range(cache.dropped + 1, before)]
-                assert numbers(cache, 0, before) == wanted
-        assert {part.keys.untyped_storage().nbytes() for part in cache.read(0, frames)} == {6 * 3 * 2 * 4 * 4}
-
-
-def test_several_frames_are_written_at_once_also_across_the_end_of_the_memory():
-    cache = filled(1, 5, 7)  # holds 0, 3, 4, 5, 6
-    cache.drop_oldest()
-    cache.drop_oldest()
-    both = KeysValues(*(torch.cat(parts) for parts in zip(frame(7), frame(8), strict=True)))
-    cache.write(0, 7, both)
-    assert numbers(cache, 0, 9) == [0, 5, 6, 7, 8]
-
-
-def test_a_gap_a_dropped_frame_and_one_too_many_are_refused():
-    cache = filled(1, 3, 5)  # holds 0, 3, 4
-    for number, match in ((7, "must follow"), (1, "was dropped"), (5, "of at most 3")):
-        with pytest.raises(ValueError, match=match):
-            cache.write(0, number, frame(number))
+def test_too_many_frames_a_gap_and_an_empty_memory_are_refused(config):
+    places = Places(3)
+    places.keep(3)
+    with pytest.raises(ValueError, match="of at most 3"):
+        places.keep(1)
+    assert places.drop_oldest() == (2, 1)
+    with pytest.raises(ValueError, match="must stand at the end"):
+        places.forget_from(1)
+    places.drop_oldest()
     with pytest.raises(ValueError, match="no frame to drop"):
-        filled(1, 3, 1).drop_oldest()
+        places.drop_oldest()
+    with pytest.raises(ValueError, match="at least one frame"):
+        Places(1)
+    history = History(config, limit=3, spare=1)
+    with pytest.raises(ValueError, match="written to before it is read"):
+        history.read(0, 0, 0)
+    with pytest.raises(ValueError, match="at most 1 frames"):
+        history.write(0, Side.RGB, frames(0, 2, 6))

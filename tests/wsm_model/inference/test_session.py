@@ -62,7 +62,7 @@ def test_the_first_velocity_of_a_dream_equals_that_of_the_single_pass(make_model
             session.observe(episodes, inputs.rgb[:, latent], known_states(inputs, start, latent + 1))
         context = model.goal(inputs.goal_camera0_m)[:, None, None].expand(-1, chunk_size, -1, -1)
         histories = [one.history for one in episodes]
-        found = velocity(model, histories, inputs.noisy_rgb[:, first:], 1.0, [first, first], context)
+        found = velocity(model, histories, inputs.noisy_rgb[:, first:], 1.0, context)
     assert_close(found, wanted)
 
 
@@ -162,15 +162,44 @@ def test_a_full_cache_drops_the_oldest_latents_and_keeps_the_anchor(make_model, 
         for latent in range(frames):
             session.observe([episode], inputs.rgb[:, latent], known_states(inputs, latent, latent + 1))
         held = episode.history.rgb
-        assert (held.held, held.dropped) == (min(limit, frames), max(0, frames - limit))
-        keys.append(torch.cat([part.keys for part in held.read(0, frames)]))
-    wanted = torch.cat([keys[1][:1], keys[1][frames - kept + 1 :]])
-    torch.testing.assert_close(keys[0], wanted)  # one layer: keys depend on their own latent alone
+        assert held.next == frames
+        assert sorted(held.numbers) == [0, *range(max(1, frames - limit + 1), frames)]
+        read = episode.history.read(0, held.held, 0).keys.transpose(0, 1).unflatten(0, (held.held, -1)).flip(0)
+        keys.append(dict(zip(held.numbers, read, strict=True)))
+    for number, kept_keys in keys[0].items():  # one layer: keys depend on their own latent alone
+        torch.testing.assert_close(kept_keys, keys[1][number])
+
+
+@pytest.mark.parametrize("limit", [20, 6])
+def test_latents_taken_in_by_chunks_equal_one_after_the_other(make_model, make_inputs, make_spans, limit):
+    """Also from the middle of a chunk on, and where the cache is full and latents are dropped on the way."""
+    model, inputs = make_model(), make_inputs(make_spans([12], [3]))
+    session = Session(model, SessionConfig(chunk_size=3, cache_latents=limit))
+    one, all_at_once = session.start(), session.start()
+    estimates = [session.observe([one], inputs.rgb[:, latent])[0] for latent in range(12)]
+    session.observe_all(all_at_once, inputs.rgb[0, :3])
+    found = session.observe_all(all_at_once, inputs.rgb[0, 3:])
+    assert found.first == 1
+    assert_close(found.poses, torch.cat([estimates[latent].poses for latent in (3, 6, 9, 11)]))
+    assert_close(found.depth, torch.cat([estimates[latent].depth for latent in (3, 6, 9, 11)]))
+    noise = inputs.noisy_rgb[:, None, :2]
+    dreams = [session.dream([each], inputs.goal_camera0_m, noise, [1.0, 0.0])[0] for each in (one, all_at_once)]
+    assert_close(dreams[0].poses, dreams[1].poses)
+
+
+def test_states_that_are_remembered_must_be_those_of_the_current_chunk(make_model, make_inputs, make_spans):
+    model, inputs = make_model(), make_inputs(make_spans([3], [2]))
+    session = Session(model, SessionConfig(chunk_size=2, cache_latents=8))
+    episode = session.start()
+    for latent in range(2):
+        session.observe([episode], inputs.rgb[:, latent])
+    with pytest.raises(ValueError, match="latents 1 to 2 are to be remembered"):
+        session.observe([episode], inputs.rgb[:, 2], known_states(inputs, 2, 3))
 
 
 def test_without_slam_the_poses_of_observed_latents_must_be_given(make_model, make_inputs, make_spans):
     model, inputs = make_model(Variant.IDM), make_inputs(make_spans([3], [1]))
-    session = Session(model, SessionConfig(chunk_size=1, cache_latents=8))
+    session = Session(model, SessionConfig(chunk_size=2, cache_latents=8))
     episode = session.start()
     (anchor,) = session.observe([episode], inputs.rgb[:, 0])
     assert torch.equal(anchor.poses, identity_poses(1, 4))
