@@ -100,6 +100,7 @@ class Reason(StrEnum):
     PATH_OFF_MAP = "path.off_map"  # the path leads over floor that the cloud never showed
     PATH_THROUGH_OBSTACLE = "path.through_obstacle"
     GOAL_UNREACHABLE = "goal.unreachable"
+    GOAL_NOT_REACHED = "goal.not_reached"  # the source states a goal, and the expert ends elsewhere
 
 
 class WsmError(Exception):

@@ -62,7 +62,7 @@ class _Noise(NamedTuple):
 def _part(batch: ClipBatch[Tensor], chosen: list[int], rows: slice, settings: _Noise) -> TrainingInputs:
     spans = {number: replace(batch.spans[number], row=batch.spans[number].row - rows.start) for number in chosen}
     place = (rows, slice(0, max(span.end for span in spans.values())))
-    rgb, depth = batch.rgb[place].float(), batch.depth[place].float()
+    rgb, depth = batch.rgb[place].float(), None if batch.depth is None else batch.depth[place].float()
     noise, depth_noise = torch.zeros(rgb.shape), torch.zeros(rgb.shape)
     depth_share = torch.zeros(rgb.shape[:2])
     flow_time = torch.zeros(rgb.shape[:2])
@@ -70,10 +70,13 @@ def _part(batch: ClipBatch[Tensor], chosen: list[int], rows: slice, settings: _N
         stream = noise_stream(settings.seed, batch.epoch, batch.step, int(batch.refs[number]))
         flow_time[span.place] = chunk_flow_times(span, settings.flow_shift, stream)
         noise[span.place] = torch.randn(span.length, *rgb.shape[2:], generator=stream)
-        if settings.depth:
+        if settings.depth and depth is not None:
             depth_share[span.place] = settings.depth * torch.rand((), generator=stream)
             depth_noise[span.place] = torch.randn(span.length, *rgb.shape[2:], generator=stream)
     noise, flow_time = noise.to(rgb.device), flow_time.to(rgb.device)
+    context = None
+    if settings.depth and depth is not None:
+        context = noised(depth, depth_noise.to(rgb.device), depth_share.to(rgb.device))
     inputs = ModelInputs(
         rgb=rgb,
         depth=depth,
@@ -82,7 +85,7 @@ def _part(batch: ClipBatch[Tensor], chosen: list[int], rows: slice, settings: _N
         noisy_rgb=noised(rgb, noise, flow_time),
         flow_time=flow_time,
         spans=tuple(spans.values()),
-        depth_context=noised(depth, depth_noise.to(rgb.device), depth_share.to(rgb.device)) if settings.depth else None,
+        depth_context=context,
     )
     return TrainingInputs(inputs=inputs, noise=noise, keys=tuple(batch.keys[number] for number in chosen))
 

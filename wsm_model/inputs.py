@@ -18,7 +18,7 @@ class ModelInputs:
 
     Attributes:
         rgb: clean RGB latents, standardised, [B, F, C, h, w].
-        depth: clean depth latents, standardised, [B, F, C, h, w]; what estimates are compared with.
+        depth: clean depth latents, standardised, [B, F, C, h, w]; what estimates are compared with. None without SLAM.
         poses: poses of the raw frames in the first camera's frame, [B, F, M, 7]: xyz (m), unit quaternion wxyz.
         goal_camera0_m: goal of each sequence in its first camera's frame, [N, 3], m.
         noisy_rgb: noisy RGB latents, [B, F, C, h, w].
@@ -28,7 +28,7 @@ class ModelInputs:
     """
 
     rgb: Tensor
-    depth: Tensor
+    depth: Tensor | None
     poses: Tensor
     goal_camera0_m: Tensor
     noisy_rgb: Tensor

@@ -79,11 +79,14 @@ class WorldSlamModel(MixtureOfTransformers):
         depth = inputs.depth if inputs.depth_context is None else inputs.depth_context
         values = {
             Expert.GENERATION: torch.stack([inputs.rgb, inputs.noisy_rgb], dim=1),
-            Expert.DEPTH: torch.stack([depth, torch.zeros_like(depth)], dim=1),
             Expert.POSE: torch.stack(
                 [inputs.poses, identity_poses(*inputs.poses.shape[:-1], device=inputs.poses.device)], dim=1
             ),
         }
+        if Expert.DEPTH in self.config.experts:
+            if depth is None:
+                raise ValueError("a model with SLAM needs inputs with depth, found none")
+            values[Expert.DEPTH] = torch.stack([depth, torch.zeros_like(depth)], dim=1)
         return {
             expert: self.expert(expert).stream(
                 values[expert], rgb_time if expert is Expert.GENERATION else state_time, index, PREDICTION

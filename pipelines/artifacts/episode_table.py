@@ -53,6 +53,8 @@ def record_digest(record: EpisodeRecord) -> str:
         "camera_pitch_rad": record.camera_pitch_rad,
         "notes": record.notes,
     }
+    if record.goal_world_m is not None:
+        stated["goal_world_m"] = record.goal_world_m
     digest = hashlib.sha256(canonical_json(stated).encode())
     digest.update(np.ascontiguousarray(record.T_world_camera, "<f8").tobytes())
     return digest.hexdigest()

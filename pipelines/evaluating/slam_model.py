@@ -33,7 +33,7 @@ def model_estimator(folder: Path, release: Release, codec: VideoCodec) -> Callab
         raise ConfigError(f"the model in {folder} must estimate states, and it is one without SLAM; name another")
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
     model.to(device)
-    standardise = standardisations(release.manifest)["rgb"]
+    standardise = standardisations(release.manifest, depth=False)["rgb"]
 
     def estimate(clip: Clip) -> Reconstruction:
         stored = torch.from_numpy(clip.rgb_latent.astype(np.float32)).to(device)

@@ -8,7 +8,7 @@ import numpy as np
 from wsm_data.codecs.base import VideoCodec
 from wsm_data.codecs.depth import depth_m_from_latent_video
 from wsm_data.codecs.ply import ply_bytes
-from wsm_data.errors import DataError, Reason
+from wsm_data.errors import ConfigError, DataError, Reason
 from wsm_data.files.atomic import write_bytes
 from wsm_data.geometry.camera import pixel_rays
 from wsm_data.geometry.transform import transform_points, transforms_from_vectors
@@ -45,7 +45,15 @@ def true_reconstruction(clip: Clip, codec: VideoCodec) -> Reconstruction:
     """The truth of a clip in the first camera's frame: its recorded frames, and the points of its measured depth.
 
     Depth is what the stored latents decode to, where every pixel of a latent's cell was measured.
+
+    Raises:
+        ConfigError: the clip has no depth.
     """
+    if clip.depth_latent is None or clip.depth_valid is None:
+        raise ConfigError(
+            f"sequences must have depth to hold a reconstruction against, and {clip.meta.key} has none: its source has "
+            "none; evaluate a release with depth"
+        )
     measured = clip.depth_valid == np.iinfo(np.uint8).max
     ratio = codec.describe().spatial_ratio
     seen = measured.repeat(ratio, axis=1).repeat(ratio, axis=2)

@@ -29,6 +29,7 @@ class _Settings:
     source: SourceConfig
     order: OrderConfig = field(default_factory=OrderConfig)
     read: ReadConfig = field(default_factory=ReadConfig)
+    depth: bool = True
 
 
 def bench_loader(
@@ -50,7 +51,7 @@ def bench_loader(
     """
     values = merge({"source": {"release": release}}, parse_assignments(assignments))
     settings = build_config(_Settings, values)
-    config = LoaderConfig(sources=(settings.source,), order=settings.order, read=settings.read)
+    config = LoaderConfig(sources=(settings.source,), order=settings.order, read=settings.read, depth=settings.depth)
     run, facts = examine(config, batches=batches, seconds=seconds, step_s=step_s, ranks=ranks)
     typer.echo(describe(run, config.read, ranks))
     typer.echo(f"\n{diagnose(run, config.read)}")

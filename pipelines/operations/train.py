@@ -9,7 +9,7 @@ import typer
 
 from pipelines.running.settings import config_json, merge, parse_assignments
 from pipelines.training.config import TrainRunConfig
-from pipelines.training.data import model_config
+from pipelines.training.data import model_config, needs_depth
 from pipelines.training.pretrain import run_training
 from wsm_data.errors import ConfigError
 from wsm_data.files.typed_toml import build_config, load_toml
@@ -68,7 +68,8 @@ def train_config(release: str | None, config: Path | None, assignments: Sequence
 
 def describe(config: TrainRunConfig) -> str:
     """What a run would do, in a few lines; no clip is read."""
-    settings = LoaderConfig(sources=config.sources, order=config.order, read=replace(config.read, device="cpu"))
+    read = replace(config.read, device="cpu")
+    settings = LoaderConfig(sources=config.sources, order=config.order, read=read, depth=needs_depth(config))
     with ClipLoader(settings, rank=0, world_size=1) as loader:
         manifest = loader.sources.tables[0].release.manifest
         shape = model_config(config, manifest)

@@ -68,7 +68,7 @@ class _SceneInput:
     @property
     def map_from(self) -> str:
         """What the map was made of."""
-        return "depth" if self.mapped.facts["fused_from_depth"] else "cloud"
+        return str(self.mapped.facts["map_from"])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -184,10 +184,10 @@ def _encode(
     config: EncodeConfig,
     out: Path,
 ) -> Iterator[Outcome]:
-    latents = codec.encode_many([video for one in waiting for video in (one.videos.rgb, one.videos.depth)])
+    latents = iter(codec.encode_many([video for one in waiting for video in one.videos.all]))
     info = codec.describe()
-    for number, one in enumerate(waiting):
-        pair = latents[2 * number], latents[2 * number + 1]
+    for one in waiting:
+        own = [next(latents) for _ in one.videos.all]
         provenance = Provenance(
             dataset=source.dataset,
             map_digest=one.unit.inputs["map"],
@@ -195,13 +195,13 @@ def _encode(
             codec=info.name,
             codec_digest=info.digest,
         )
-        clip = build_clip(one.record, one.view, one.videos, pair, provenance, config.clip)
+        clip = build_clip(one.record, one.view, one.videos, own, provenance, config.clip)
         try:
             fragment = build_fragment(clip)
         except DataError as error:  # a name that cannot be stored is no fault of the others in the batch
             yield refused(one.unit, error)
             continue
-        yield _written(one, fragment, _quality(one, pair, codec, config), out)
+        yield _written(one, fragment, _quality(one, own, codec, config), out)
 
 
 def _written(one: _Prepared, fragment: Fragment, quality: dict[str, object] | None, out: Path) -> Outcome:
@@ -221,7 +221,7 @@ def _written(one: _Prepared, fragment: Fragment, quality: dict[str, object] | No
 
 
 def _quality(
-    one: _Prepared, latents: tuple[Float32Array, Float32Array], codec: VideoCodec, config: EncodeConfig
+    one: _Prepared, latents: Sequence[Float32Array], codec: VideoCodec, config: EncodeConfig
 ) -> dict[str, object] | None:
     rank = int(sha256_bytes(one.unit.id.encode())[:8], 16) / 16**8
     if rank >= config.quality_share:

@@ -31,7 +31,8 @@ class MapConfig:
 
     Attributes:
         index: folder of `wsm index`.
-        without_cloud: `fuse` the map from depth images and note it (cloud.missing), or `refuse` the scene.
+        without_cloud: `fuse` the map from depth images and note it (cloud.missing), or `refuse` the scene. Where there
+            is no depth either, the map is what the expert's footprint swept.
     """
 
     index: Path = field(metadata=INPUT)
@@ -71,7 +72,7 @@ def _map_scene(unit: Unit, config: MapConfig, out: Path) -> Outcome:
         refusal = refusal_from_json(facts["cloud_refusal"])
         raise DataError(refusal.reason, refusal.message, refusal.details)
     voxels = load_voxels(vouched_by_ledger(config.index, unit.payload, surface_path(config.index, unit.id)))
-    if voxels.origin == "depth" and config.without_cloud is WithoutCloud.REFUSE:
+    if voxels.origin != "cloud" and config.without_cloud is WithoutCloud.REFUSE:
         raise DataError(
             Reason.CLOUD_MISSING,
             f"{unit.id} has no point cloud; add meta/pointcloud.ply, or let the map be fused from depth images with "
@@ -84,7 +85,7 @@ def _map_scene(unit: Unit, config: MapConfig, out: Path) -> Outcome:
     save_scene_map(path, scene_map)
     measured = {
         "floors": len(scene_map.levels),
-        "fused_from_depth": int(voxels.origin == "depth"),
+        "map_from": voxels.origin,
         "levels": [[level.floor_z_m, scene_map_digest(scene_map, level.floor_z_m)] for level in scene_map.levels],
     }
     return Outcome(
@@ -96,4 +97,4 @@ def _floors(facts: Mapping[str, Any]) -> tuple[float, ...]:
     return floor_levels([row["floor_z_m"] for row in facts["episodes"]])
 
 
-STAGE = Stage(name="map", version=2, config_type=MapConfig, list_units=_list_units, process=_process)
+STAGE = Stage(name="map", version=3, config_type=MapConfig, list_units=_list_units, process=_process)

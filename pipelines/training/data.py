@@ -11,7 +11,7 @@ from wsm_data.errors import ConfigError
 from wsm_data.loaders.config import Arrangement, LoaderConfig, OrderConfig, ReadConfig, Remainder, SourceConfig
 from wsm_data.loaders.loader import ClipLoader
 from wsm_data.shards.manifest import ReleaseManifest
-from wsm_model.config import ModelConfig
+from wsm_model.config import ModelConfig, Variant
 from wsm_model.presets import preset
 
 _LOG = logging.getLogger(__name__)
@@ -33,7 +33,9 @@ def training_loader(
         )
     is_pinned = device.type == "cuda"
     read = replace(config.read, device=str(device), pin_memory=is_pinned)
-    settings = LoaderConfig(sources=config.sources, order=config.order, read=read, ledger=ledger)
+    settings = LoaderConfig(
+        sources=config.sources, order=config.order, read=read, ledger=ledger, depth=needs_depth(config)
+    )
     return ClipLoader(settings, rank=rank, world_size=world_size)
 
 
@@ -59,8 +61,14 @@ def held_out_loader(config: TrainRunConfig, device: torch.device) -> ClipLoader 
         sources=(SourceConfig(release=source.release, split=held_out.split),),
         order=order,
         read=ReadConfig(device=str(device), threads=1, prefetch_batches=1),
+        depth=needs_depth(config),
     )
     return ClipLoader(settings, rank=0, world_size=1)
+
+
+def needs_depth(config: TrainRunConfig) -> bool:
+    """Whether the model learns depth, and so every clip must have it."""
+    return config.model.variant is Variant.SLAM
 
 
 def model_config(config: TrainRunConfig, manifest: ReleaseManifest) -> ModelConfig:

@@ -135,7 +135,7 @@ def _draw(
     depth: Tensor | None,
     poses: Tensor,
 ) -> None:
-    true_rgb, true_depth = batch.rgb[0, :end].float(), batch.depth[0, :end].float()
+    true_rgb = batch.rgb[0, :end].float()
     first = frames_of(seen)  # the first raw frame of the dream
     dreamed_frames = frames_of(end) - first
     frames = [first + one for one in spread_frames(dreamed_frames, _FRAMES_SHOWN)]
@@ -148,7 +148,7 @@ def _draw(
         frames=tuple(frames),
         true_rgb_u8=decoding.rgb_u8(true_rgb)[frames],
         dreamed_rgb_u8=decoding.rgb_u8(with_dream)[frames],
-        true_depth_m=decoding.depth_m(true_depth)[frames],
+        true_depth_m=None if batch.depth is None else decoding.depth_m(batch.depth[0, :end])[frames],
         estimated_depth_m=None if depth is None else decoding.depth_m(depth)[frames],
         depth_range=decoding.depth_range,
         true_path_m=true_m,

@@ -24,7 +24,8 @@ def read_members(
     Args:
         reader: of the release's shards.
         row: the clip.
-        names: names of the members, in stored order, none between them left out.
+        names: names of the members, in stored order, none between them left out; those that the clip does not have are
+            passed over.
         checked: compare headers and checksums.
 
     Returns:

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from wsm_data.checks.goal_reached import ARRIVED_M
 from wsm_data.errors import IntegrityError
 from wsm_data.files.digest import xxh3_64
 from wsm_data.schema.clip import UNREACHABLE_MM, Clip
@@ -13,9 +14,6 @@ from wsm_data.shards.findings import Finding, FindingKind
 from wsm_data.shards.index_row import IndexRow
 from wsm_data.shards.manifest import ReleaseManifest
 from wsm_data.shards.members import Member, header_bytes
-
-ARRIVED_M = 1e-3
-"""The expert's last distance to the goal region must not exceed this, m: distances are stored in steps of 1 mm."""
 
 
 def check_clip(data: memoryview, row: IndexRow, manifest: ReleaseManifest) -> list[Finding]:

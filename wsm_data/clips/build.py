@@ -1,5 +1,6 @@
 """From one trajectory and its map to one clip: the only place where videos, poses and geodesics meet."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,7 +34,7 @@ class Provenance:
     Attributes:
         dataset: the source's conventions.
         map_digest: digest of the map level the trajectory lies on.
-        map_from: `cloud` or `depth`.
+        map_from: `cloud`, `depth` or `path`.
         codec: name of the codec.
         codec_digest: digest of the codec.
     """
@@ -51,13 +52,18 @@ class ClipVideos:
 
     Attributes:
         rgb: float32 [T, H, W, 3] in [-1, 1].
-        depth: log-depth, one channel repeated; float32 [T, H, W, 3] in [-1, 1].
-        depth_valid: pixels with a measurement; bool [T, H, W].
+        depth: log-depth, one channel repeated; float32 [T, H, W, 3] in [-1, 1]. None where the source has no depth.
+        depth_valid: pixels with a measurement; bool [T, H, W]. None likewise.
     """
 
     rgb: Float32Array
-    depth: Float32Array
-    depth_valid: BoolArray
+    depth: Float32Array | None
+    depth_valid: BoolArray | None
+
+    @property
+    def all(self) -> list[Float32Array]:
+        """What is encoded: the colour video, then that of depth where there is one."""
+        return [self.rgb] if self.depth is None else [self.rgb, self.depth]
 
 
 def read_videos(
@@ -76,6 +82,8 @@ def read_videos(
     length = padded_length(record.frame_count, config.still_frames)
     size = config.width, config.height
     rgb = rgb_video(frames.rgb, *size, where, length, memory)
+    if not record.has_depth:
+        return ClipVideos(rgb=rgb, depth=None, depth_valid=None)
     depth, valid = depth_video(frames.depth, dataset.depth, config.depth_range, *size, where, length, memory)
     require_kept(check_depth_measured(valid[: record.frame_count], where))
     return ClipVideos(rgb=rgb, depth=depth, depth_valid=valid)
@@ -85,7 +93,7 @@ def build_clip(
     record: EpisodeRecord,
     view: SceneView,
     videos: ClipVideos,
-    latents: tuple[Float32Array, Float32Array],
+    latents: Sequence[Float32Array],
     provenance: Provenance,
     config: ClipConfig,
 ) -> Clip:
@@ -95,7 +103,7 @@ def build_clip(
         record: the trajectory.
         view: it on its map.
         videos: its videos; only the validity of depth is taken from here.
-        latents: codec latents of the colour and of the depth video, float32 [F, C, h, w].
+        latents: codec latents of the videos, in their order, float32 [F, C, h, w].
         provenance: what cannot be seen in the data.
         config: what a clip holds.
     """
@@ -105,8 +113,8 @@ def build_clip(
     return Clip(
         meta=_meta(record, view, length, provenance, config),
         rgb_latent=latents[0].astype(np.float16),
-        depth_latent=latents[1].astype(np.float16),
-        depth_valid=valid_share(videos.depth_valid),
+        depth_latent=None if videos.depth is None else latents[1].astype(np.float16),
+        depth_valid=None if videos.depth_valid is None else valid_share(videos.depth_valid),
         poses=poses.astype(np.float32),
         occupancy=np.array(view.occupancy.cells),
         geodesic_mm=field_to_mm(view.geodesic_m),
@@ -115,7 +123,7 @@ def build_clip(
 
 
 def measure_quality(
-    videos: ClipVideos, latents: tuple[Float32Array, Float32Array], codec: VideoCodec, config: ClipConfig, frames: int
+    videos: ClipVideos, latents: Sequence[Float32Array], codec: VideoCodec, config: ClipConfig, frames: int
 ) -> CodecQuality:
     """Decode a clip's float16 latents again and compare every 7th of its `frames` own frames with what went in.
 
@@ -123,19 +131,19 @@ def measure_quality(
     fill the last block and to stand still, are left out.
     """
     sampled = slice(0, frames, QUALITY_STRIDE)
-    rgb, depth = (codec.decode(one.astype(np.float16).astype(np.float32))[sampled] for one in latents)
-    errors = depth_error_by_range(
-        depth_m_from_latent_video(videos.depth[sampled], config.depth_range),
-        depth_m_from_latent_video(depth, config.depth_range),
-        videos.depth_valid[sampled],
-        DEPTH_EDGES_M,
-    )
-    return clip_quality(videos.rgb[sampled], rgb, errors)
+    decoded = [codec.decode(one.astype(np.float16).astype(np.float32))[sampled] for one in latents]
+    true_m, depth_m, valid = np.empty(0, np.float32), np.empty(0, np.float32), np.empty(0, np.bool_)
+    if videos.depth is not None and videos.depth_valid is not None:
+        true_m = depth_m_from_latent_video(videos.depth[sampled], config.depth_range)
+        depth_m = depth_m_from_latent_video(decoded[1], config.depth_range)
+        valid = videos.depth_valid[sampled]
+    errors = depth_error_by_range(true_m, depth_m, valid, DEPTH_EDGES_M)
+    return clip_quality(videos.rgb[sampled], decoded[0], errors)
 
 
 def _meta(record: EpisodeRecord, view: SceneView, length: int, provenance: Provenance, config: ClipConfig) -> ClipMeta:
     T_world_camera0 = record.T_world_camera[0]
-    goal_world_m = record.T_world_camera[-1, :3, 3]
+    goal_world_m = record.goal_m
     goal_camera0_m = transform_points(invert(T_world_camera0), goal_world_m[None])[0]
     return ClipMeta(
         key=record.id.key,
@@ -160,7 +168,7 @@ def _meta(record: EpisodeRecord, view: SceneView, length: int, provenance: Prove
         codec=provenance.codec,
         codec_digest=provenance.codec_digest,
         depth_range=config.depth_range,
-        notes=record.notes + ((Reason.CLOUD_MISSING.value,) if provenance.map_from == "depth" else ()),
+        notes=record.notes + (() if provenance.map_from == "cloud" else (Reason.CLOUD_MISSING.value,)),
     )
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from wsm_data.checks.expert_path import check_expert_path
 from wsm_data.checks.gate import require_kept
+from wsm_data.checks.goal_reached import check_goal_reached
 from wsm_data.checks.path_shown import check_path_shown
 from wsm_data.checks.reachability import check_goal_reachable
 from wsm_data.clips.config import ClipConfig
@@ -48,20 +49,23 @@ def view_scene(record: EpisodeRecord, scene_map: SceneMap, dataset: DatasetManif
 
     Raises:
         DataError: the path leads through an obstacle, over floor that the cloud never showed or far away from the map,
-            or the goal cannot be reached.
+            the goal cannot be reached, or the expert ends elsewhere than at the stated one.
     """
     path_xy_m, radius_m = record.path_xy_m, dataset.robot.radius_m
+    goal_xy_m = record.goal_m[:2]
+    around_xy_m = np.concatenate([path_xy_m, goal_xy_m[None]])
     floor = occupancy_for(scene_map, record.floor_z_m, record.camera_height_m, dataset.robot)
-    floor = _around_path(floor, path_xy_m, config.map_margin_m, record.id.text)
+    floor = _around_path(floor, around_xy_m, config.map_margin_m, record.id.text)
     if scene_map.origin == "cloud":
         require_kept(check_path_shown(floor, path_xy_m, record.id.text, dataset.checks.max_unknown_path_share))
     floor, filled = fill_holes(floor, config.fill_holes_cells)
     floor, freed = free_swept_cells(floor, path_xy_m, radius_m)
     require_kept(check_expert_path(clearance_m(floor, path_xy_m), record.id.text, dataset.checks.min_path_clearance_m))
-    geodesic_m = geodesic_distance(floor, path_xy_m[-1], radius_m, config.goal_radius_m)
+    geodesic_m = geodesic_distance(floor, goal_xy_m, radius_m, config.goal_radius_m)
     distance_m = sample_distance(geodesic_m, floor, path_xy_m)
     require_kept(check_goal_reachable(distance_m, record.id.text))
-    crop = crop_around(floor, path_xy_m, config.map_margin_m)
+    require_kept(check_goal_reached(float(distance_m[-1]), config.goal_radius_m, record.id.text))
+    crop = crop_around(floor, around_xy_m, config.map_margin_m)
     column, row = (inner - outer for inner, outer in zip(crop.origin_cell, floor.origin_cell, strict=True))
     height, width = crop.cells.shape
     return SceneView(

@@ -150,10 +150,12 @@ class LoaderConfig:
         sources: what is mixed.
         order: which clips make up which step.
         read: how they are read.
+        depth: whether batches have depth. With it every clip must have depth; without, none is read.
         ledger: folder in which every delivered step is recorded; empty for none.
     """
 
     sources: tuple[SourceConfig, ...]
     order: OrderConfig = field(default_factory=OrderConfig)
     read: ReadConfig = field(default_factory=ReadConfig)
+    depth: bool = True
     ledger: str = ""

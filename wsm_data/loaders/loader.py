@@ -18,7 +18,7 @@ from wsm_data.loaders.order.epoch_order import EpochOrder, EpochSummary, rows_pe
 from wsm_data.loaders.ranks import place_among_ranks
 from wsm_data.loaders.reading.delivery import Delivery, deliver
 from wsm_data.loaders.reading.step_reader import Delivered, StepReader
-from wsm_data.loaders.sources.clips import Sources, open_sources
+from wsm_data.loaders.sources.clips import Sources, open_sources, require_depth
 from wsm_data.loaders.sources.state import loader_state, restore, state_to_json
 from wsm_data.loaders.timing import Part, Timing
 
@@ -64,7 +64,9 @@ class ClipLoader(torch.utils.data.IterableDataset[Batch]):
         rows_per_rank(config.order, self._world_size)
         self._sources = open_sources(config.sources) if sources is None else sources
         manifest = self._sources.tables[0].release.manifest
-        self._transfer = open_transfer(config.read, manifest)
+        if config.depth:
+            require_depth(self._sources)
+        self._transfer = open_transfer(config.read, manifest, depth=config.depth)
         self.timing = Timing()
         self._reader = self._open_reader()
         self._process = os.getpid()
@@ -239,7 +241,14 @@ class ClipLoader(torch.utils.data.IterableDataset[Batch]):
         self._process = _CLOSED
 
     def _open_reader(self) -> StepReader:
-        return StepReader(self._sources, self._config.read, self.timing, rank=self._rank, world_size=self._world_size)
+        return StepReader(
+            self._sources,
+            self._config.read,
+            self.timing,
+            rank=self._rank,
+            world_size=self._world_size,
+            depth=self._config.depth,
+        )
 
     def _open_ledger(self) -> LedgerWriter | None:
         identity = {"sources": self._template.sources, "order": self._template.order}

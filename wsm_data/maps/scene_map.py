@@ -60,7 +60,7 @@ class SceneMap:
 
     Attributes:
         levels: by rising floor.
-        origin: `cloud`, or `depth` where depth images were fused.
+        origin: `cloud`, `depth` where depth images were fused, or `path` where nothing shows the scene.
     """
 
     levels: tuple[FloorLevel, ...]

@@ -73,6 +73,11 @@ def voxels_from_depth(chunks_world_m: Iterable[Float64Array]) -> SurfaceVoxels:
     return _from_keys(_unique(np.concatenate([merged, *waiting])), "depth")
 
 
+def no_voxels() -> SurfaceVoxels:
+    """The surface of a scene that neither a cloud nor depth shows."""
+    return _from_keys(np.zeros(0, np.int64), "path")
+
+
 def save_voxels(path: Path, voxels: SurfaceVoxels) -> None:
     """Write boxes to an .npz file, atomically; equal boxes give equal bytes."""
     save_arrays(path, _arrays(voxels))

@@ -11,6 +11,7 @@ import numpy as np
 from wsm_data.errors import ConfigError, DataError, Reason
 from wsm_data.readers.arrays import EPISODE_FILE
 from wsm_data.readers.folder_signature import folder_signature
+from wsm_data.readers.frames_digest import ABSENT
 from wsm_data.readers.recorded import Recording, image_size, iter_recorded, scan_recording
 from wsm_data.readers.source import Container, ContainerScan, SourceReader
 from wsm_data.readers.thinning import moving_frames
@@ -21,7 +22,7 @@ from wsm_data.schema.episode import EpisodeRecord
 from wsm_data.schema.frames import EpisodeFrames
 from wsm_data.schema.verdict import Refusal
 
-EXPECTS = f"<scene>/<episode>/{EPISODE_FILE} with rgb/ and depth/ beside it"
+EXPECTS = f"<scene>/<episode>/{EPISODE_FILE} with rgb/, and depth/ where there is depth, beside it"
 
 _LAYOUT = "scene"
 
@@ -67,7 +68,8 @@ def _read_recording(
         K = np.array(said["K"], np.float64).reshape(3, 3)
         width, height = image_size(scene, f"{episode}/rgb/000000.png", container)
         intrinsics = Intrinsics(fx=K[0, 0], fy=K[1, 1], cx=K[0, 2], cy=K[1, 2], width=width, height=height)
-        camera, floor = str(said["camera"]), said["floor_z_m"]
+        camera, floor, goal = str(said["camera"]), said["floor_z_m"], said["goal_world_m"]
+        goal_world_m = None if goal is None else _point(goal)
         floor_z_m = dataset.motion.floor_z_m if floor is None else float(floor)
     except (ValueError, KeyError, TypeError) as error:
         raise DataError(
@@ -81,11 +83,19 @@ def _read_recording(
         scene=container,
         episode=episode,
         rgb=tuple(f"{episode}/rgb/{i:06d}.png" for i in kept),
-        depth=tuple(f"{episode}/depth/{i:06d}.png" for i in kept),
+        depth=tuple(f"{episode}/depth/{i:06d}.png" if said["depth"] else ABSENT for i in kept),
         T_world_camera=T_world_camera[kept],
         intrinsics=intrinsics,
+        goal_world_m=goal_world_m,
     )
     return recording, floor_z_m
+
+
+def _point(numbers: Sequence[float]) -> tuple[float, float, float]:
+    x, y, z = (float(number) for number in numbers)
+    if not np.isfinite([x, y, z]).all():
+        raise ValueError(f"goal_world_m must be finite, found {list(numbers)}")
+    return x, y, z
 
 
 def _iter_frames(

@@ -36,6 +36,7 @@ _SCHEMA = pa.schema(
             ("frames_digest", pa.string()),
             ("content_digest", pa.string()),
             ("notes", pa.list_(pa.field("element", pa.string(), nullable=False))),
+            ("goal_world_m", pa.list_(pa.field("element", pa.float64(), nullable=False))),
         )
     ]
 )
@@ -67,6 +68,8 @@ def _cell(record: EpisodeRecord, column: str) -> object:
         return record.id.text
     if column == "T_world_camera":
         return record.T_world_camera.ravel()
+    if column == "goal_world_m":
+        return record.goal_world_m or ()
     return getattr(record.intrinsics if column in _INTRINSICS else record, column)
 
 
@@ -77,4 +80,5 @@ def _record(row: Mapping[str, Any]) -> EpisodeRecord:
     values["T_world_camera"] = np.array(row["T_world_camera"], np.float64).reshape(-1, 4, 4)
     for name in ("rgb_members", "depth_members", "notes"):
         values[name] = tuple(row[name])
+    values["goal_world_m"] = tuple(row["goal_world_m"]) or None
     return EpisodeRecord(**values)

@@ -43,6 +43,7 @@ class Recording:
         T_world_camera: float64 [N, 4, 4].
         intrinsics: of all images.
         notes: reason codes of what was left out.
+        goal_world_m: where the recording as a whole leads to, m; None: to its last position.
     """
 
     container: str
@@ -54,6 +55,7 @@ class Recording:
     intrinsics: Intrinsics
     episode: str = ""
     notes: tuple[str, ...] = ()
+    goal_world_m: tuple[float, float, float] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -169,6 +171,8 @@ def _floor_z_m(recording: Recording, read: Sequence[_Piece], dataset: DatasetMan
 
 def _record(recording: Recording, piece: _Piece, floor: float) -> EpisodeRecord:
     T_world_camera = recording.T_world_camera[piece.frames]
+    is_last = piece.frames.stop == len(recording.rgb)  # the pieces before it lead to where they end
+    goal_world_m = recording.goal_world_m if is_last else None
     return EpisodeRecord(
         id=piece.id,
         container=recording.container,
@@ -179,13 +183,20 @@ def _record(recording: Recording, piece: _Piece, floor: float) -> EpisodeRecord:
         camera_height_m=float(T_world_camera[0, 2, 3]) - floor,
         camera_pitch_rad=float(np.arcsin(np.clip(-T_world_camera[0, 2, 2], -1.0, 1.0))),
         frames_digest=piece.frames_digest,
-        content_digest=_content_digest(piece.frames_digest, T_world_camera, recording.intrinsics, floor),
+        content_digest=_content_digest(piece.frames_digest, T_world_camera, recording.intrinsics, floor, goal_world_m),
         notes=recording.notes,
+        goal_world_m=goal_world_m,
     )
 
 
-def _content_digest(frames_digest: str, T_world_camera: Float64Array, intrinsics: Intrinsics, floor: float) -> str:
+def _content_digest(
+    frames_digest: str,
+    T_world_camera: Float64Array,
+    intrinsics: Intrinsics,
+    floor: float,
+    goal_world_m: tuple[float, ...] | None,
+) -> str:
     digest = hashlib.sha256(frames_digest.encode())
-    for values in (intrinsics.matrix, T_world_camera, np.array([floor])):
+    for values in (intrinsics.matrix, T_world_camera, np.array([floor]), np.array(goal_world_m or ())):
         digest.update(np.ascontiguousarray(values, "<f8").tobytes())
     return digest.hexdigest()

@@ -17,8 +17,8 @@ class ClipBatch(Generic[TensorT]):
 
     Attributes:
         rgb: colour latents; [R, L, C, h, w].
-        depth: depth latents; [R, L, C, h, w].
-        depth_valid: share of pixels with a depth measurement, 0 to 255; uint8 [R, L, h, w].
+        depth: depth latents; [R, L, C, h, w]. None where they were not asked for.
+        depth_valid: share of pixels with a depth measurement, 0 to 255; uint8 [R, L, h, w]. None likewise.
         poses: camera in the first camera's frame, x, y, z (m) and quaternion w, x, y, z; float32 [R, L, 4, 7]. Slot
             m = 0..3 of latent j >= 1 is raw frame 4 (j - 1) + m + 1; latent 0 has the identity four times.
         still: pose slots of still frames that were added at the end of a clip; bool [R, L, 4].
@@ -33,8 +33,6 @@ class ClipBatch(Generic[TensorT]):
     """
 
     rgb: TensorT
-    depth: TensorT
-    depth_valid: TensorT
     poses: TensorT
     still: TensorT
     sequence_id: TensorT
@@ -45,3 +43,5 @@ class ClipBatch(Generic[TensorT]):
     keys: tuple[str, ...]
     epoch: int
     step: int
+    depth: TensorT | None = None
+    depth_valid: TensorT | None = None

@@ -33,6 +33,9 @@ MEMBERS: Mapping[str, tuple[np.dtype[np.generic], str]] = MappingProxyType(
 )
 """Array members of a clip in the order in which they are stored: dtype and axes. `meta.json` comes last."""
 
+DEPTH_MEMBERS = ("depth_latent", "depth_valid")
+"""Those that are absent, both, where the source has no depth."""
+
 META_MEMBER = "meta.json"
 UNREACHABLE_MM = 65535
 _QUATERNION_TOLERANCE = 1e-5  # float32 rounding of four numbers of size one
@@ -45,8 +48,9 @@ class Clip:
     Attributes:
         meta: provenance and everything that is a number rather than an array.
         rgb_latent: codec latents of the colour video, not standardised; float16 [F, C, h, w].
-        depth_latent: codec latents of the log-depth video, not standardised; float16 [F, C, h, w].
-        depth_valid: share of valid depth pixels per latent cell, 0..255; uint8 [F, h, w].
+        depth_latent: codec latents of the log-depth video, not standardised; float16 [F, C, h, w]. None where the
+            source has no depth.
+        depth_valid: share of valid depth pixels per latent cell, 0..255; uint8 [F, h, w]. None likewise.
         poses: camera in the first camera's frame, xyz (m) and quaternion wxyz; float32 [T, 7], row 0 is the identity.
         occupancy: 0 free, 1 occupied, 255 unknown; uint8 [Y, X].
         geodesic_mm: distance to the goal region, mm; uint16 [Y, X], 65535 unreachable or occupied.
@@ -55,17 +59,19 @@ class Clip:
 
     meta: ClipMeta
     rgb_latent: Float16Array
-    depth_latent: Float16Array
-    depth_valid: Uint8Array
     poses: Float32Array
     occupancy: Uint8Array
     geodesic_mm: Uint16Array
     expert_distance: Float32Array
+    depth_latent: Float16Array | None = None
+    depth_valid: Uint8Array | None = None
 
     def __post_init__(self) -> None:
+        if (self.depth_latent is None) != (self.depth_valid is None):
+            raise ValueError("depth_latent and depth_valid must be there both, or neither, found one of them")
         sizes: dict[str, int] = {}
-        for name, (dtype, axes) in MEMBERS.items():
-            array = getattr(self, name)
+        for name, array in self.arrays().items():
+            dtype, axes = MEMBERS[name]
             shape = tuple(7 if axis == "7" else sizes.get(axis) for axis in axes)
             require_array(name, array, dtype, shape)
             sizes.update({axis: size for axis, size in zip(axes, array.shape, strict=True) if axis != "7"})
@@ -83,6 +89,11 @@ class Clip:
         _require_poses(self.poses)
 
     @property
+    def has_depth(self) -> bool:
+        """Whether the source has depth."""
+        return self.depth_latent is not None
+
+    @property
     def frame_count(self) -> int:
         """T, the number of raw frames, padding included."""
         return len(self.poses)
@@ -98,8 +109,8 @@ class Clip:
         return self.meta.intrinsics
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """The array members by name, in stored order."""
-        return {name: getattr(self, name) for name in MEMBERS}
+        """The array members that are there, by name, in stored order."""
+        return {name: array for name in MEMBERS if (array := getattr(self, name)) is not None}
 
 
 def _require_poses(poses: Float32Array) -> None:

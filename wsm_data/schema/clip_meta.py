@@ -27,11 +27,12 @@ class ClipMeta:
         map_digest: digest of the level of the scene map that was cropped: its floor, and what stands on it.
         intrinsics: camera at the encoded size.
         T_world_camera0: first camera to world; 4 x 4 nested tuples, m.
-        goal_world_m: last camera position in the world, m.
+        goal_world_m: the stated goal in the world, m; the last camera position where none is stated.
         goal_camera0_m: the same point in the first camera's frame, m.
         map_origin_cell: (ix, iy) of cell (0, 0) of the crop on the world's grid.
         map_resolution_m: side of a map cell, m.
-        map_from: `cloud` or `depth`.
+        map_from: `cloud`, `depth`, or `path` where the source has neither: all that is known of the floor then is what
+            the expert's footprint swept.
         freed_cells: unknown cells that are free because the expert's footprint swept them, or as filled holes.
         goal_radius_m: radius r_g of the goal region, m.
         robot_radius_m: radius of the footprint by which obstacles were inflated, m.
@@ -75,8 +76,8 @@ class ClipMeta:
 
     def __post_init__(self) -> None:
         _require_version(self.format_version)
-        if self.map_from not in ("cloud", "depth"):
-            raise ValueError(f"map_from must be 'cloud' or 'depth', found {self.map_from!r}")
+        if self.map_from not in ("cloud", "depth", "path"):
+            raise ValueError(f"map_from must be 'cloud', 'depth' or 'path', found {self.map_from!r}")
         if not 0 <= self.padded_frames < self.frames:
             raise ValueError(f"padded_frames must lie in [0, frames = {self.frames}), found {self.padded_frames}")
         if [len(row) for row in self.T_world_camera0] != [4, 4, 4, 4]:

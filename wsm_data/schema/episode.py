@@ -17,7 +17,7 @@ class EpisodeRecord:
         id: what the trajectory is called in every layout.
         container: path of its archive or folder relative to the source root, with `/`.
         rgb_members: names of the T colour images inside the container, in time order.
-        depth_members: names of the T depth images inside the container, in time order.
+        depth_members: names of the T depth images inside the container, in time order, empty where a frame has none.
         T_world_camera: camera to world, OpenCV camera (x right, y down, z forward), world z up, m; float64 [T, 4, 4].
         intrinsics: at the size of the stored images.
         camera_height_m: height of the camera above the floor, m; also the height of the robot.
@@ -25,6 +25,8 @@ class EpisodeRecord:
         frames_digest: digest of the image bytes in time order; compared again when the frames are read.
         content_digest: digest of image bytes, poses, intrinsics and mount; the same in every layout.
         notes: reason codes of what was accepted but is worth knowing.
+        goal_world_m: where the expert drives to, in the world, at the height of the camera, m; None where the source
+            does not say: the last camera position.
     """
 
     id: EpisodeId
@@ -38,6 +40,7 @@ class EpisodeRecord:
     frames_digest: str
     content_digest: str
     notes: tuple[str, ...] = ()
+    goal_world_m: tuple[float, float, float] | None = None
 
     def __post_init__(self) -> None:
         frames = len(self.rgb_members)
@@ -45,6 +48,8 @@ class EpisodeRecord:
         require_finite("T_world_camera", self.T_world_camera)
         if len(self.depth_members) != frames:
             raise ValueError(f"{self.id.text}: {frames} colour images but {len(self.depth_members)} depth images")
+        if self.goal_world_m is not None:
+            require_finite("goal_world_m", np.array(self.goal_world_m))
         object.__setattr__(self, "T_world_camera", frozen_array(self.T_world_camera))
 
     @property
@@ -53,9 +58,20 @@ class EpisodeRecord:
         return len(self.rgb_members)
 
     @property
+    def has_depth(self) -> bool:
+        """Whether any frame has a depth image; a trajectory without becomes a clip without depth."""
+        return any(self.depth_members)
+
+    @property
     def floor_z_m(self) -> float:
         """Height of the floor the robot starts on, in the world, m: the first camera's z less its mount height."""
         return float(self.T_world_camera[0, 2, 3]) - self.camera_height_m
+
+    @property
+    def goal_m(self) -> Float64Array:
+        """Where the expert drives to, in the world, m; float64 [3]."""
+        stated = self.T_world_camera[-1, :3, 3] if self.goal_world_m is None else self.goal_world_m
+        return np.array(stated, np.float64)
 
     @property
     def path_xy_m(self) -> Float64Array:

@@ -19,8 +19,8 @@ class LatentStandard:
         codec_digest: digest of its settings and weights.
         rgb_mean: of RGB latents.
         rgb_std: of RGB latents.
-        depth_mean: of depth latents.
-        depth_std: of depth latents.
+        depth_mean: of depth latents; empty where there is no depth.
+        depth_std: of depth latents; likewise.
     """
 
     codec: str

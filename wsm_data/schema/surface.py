@@ -24,7 +24,8 @@ class SurfaceVoxels:
     Attributes:
         cells: (ix, iy, iz); int16 [N, 3], in lexicographic order.
         obstacle: whether the source marks the box as an obstacle; bool [N].
-        origin: `cloud`, or `depth` where there was no cloud and depth images were fused.
+        origin: `cloud`, `depth` where there was no cloud and depth images were fused, or `path` where there was neither
+            and so no box.
     """
 
     cells: Int16Array
@@ -34,8 +35,10 @@ class SurfaceVoxels:
     def __post_init__(self) -> None:
         require_array("cells", self.cells, np.int16, (None, 3))
         require_array("obstacle", self.obstacle, np.bool_, (len(self.cells),))
-        if self.origin not in ("cloud", "depth"):
-            raise ValueError(f"origin must be 'cloud' or 'depth', found {self.origin!r}")
+        if self.origin not in ("cloud", "depth", "path"):
+            raise ValueError(f"origin must be 'cloud', 'depth' or 'path', found {self.origin!r}")
+        if self.origin == "path" and len(self.cells):
+            raise ValueError(f"a scene of which only paths are known must have no box, found {len(self.cells)}")
         _require_strict_order(self.cells)
         object.__setattr__(self, "cells", frozen_array(self.cells))
         object.__setattr__(self, "obstacle", frozen_array(self.obstacle))

@@ -147,7 +147,8 @@ def _collect(
         tables.append(index_table(_rows(layout, infos)))
         if layout.split == TRAIN_SPLIT:
             rgb = merge_sums(([] if rgb is None else [rgb]) + [info.rgb_sums for info in infos])
-            depth = merge_sums(([] if depth is None else [depth]) + [info.depth_sums for info in infos])
+            of_depth = [info.depth_sums for info in infos if info.depth_sums is not None]
+            depth = merge_sums(([] if depth is None else [depth]) + of_depth)
     table = pa.concat_tables(tables).unify_dictionaries()
     return table, latent_statistics(rgb), latent_statistics(depth)
 

@@ -64,8 +64,12 @@ def _statistics_of_the_training_split(manifest: ReleaseManifest, index: IndexTab
     frames, padded, height, width = (index.numbers(name).astype(np.int64) for name in names)
     real = 1 + (frames - 1) // TEMPORAL_RATIO - padded // TEMPORAL_RATIO
     trained = codes == splits.index(TRAIN_SPLIT) if TRAIN_SPLIT in splits else np.zeros(len(codes), bool)
-    count = int((real * height * width)[trained].sum())
-    for name, found in (("rgb", manifest.rgb_statistics), ("depth", manifest.depth_statistics)):
+    values = np.where(trained, real * height * width, 0)
+    of_depth = values[index.numbers("depth_latent_size") > 0]
+    for name, found, count in (
+        ("rgb", manifest.rgb_statistics, int(values.sum())),
+        ("depth", manifest.depth_statistics, int(of_depth.sum())),
+    ):
         channels = manifest.codec.channels if found.count else 0
         whole = len(found.mean) == len(found.std) == channels
         if (

@@ -30,7 +30,7 @@ class FragmentInfo:
         digest: xxh3_128 of the fragment, in hexadecimal.
         members: table of the members.
         rgb_sums: sums of the colour latents, padding left out.
-        depth_sums: sums of the depth latents, padding left out.
+        depth_sums: sums of the depth latents, padding left out; None where the clip has none.
     """
 
     meta: ClipMeta
@@ -38,7 +38,7 @@ class FragmentInfo:
     digest: str
     members: tuple[Member, ...]
     rgb_sums: LatentSums
-    depth_sums: LatentSums
+    depth_sums: LatentSums | None
 
     @property
     def key(self) -> str:

@@ -2,7 +2,8 @@
 
 Numbers that decide where to read are flat integer columns, so that a loader opens ten million rows by reading only the
 columns it needs. Shapes are not repeated per member: a row holds the lengths of the axes, and the file's metadata says,
-under `wsm.members`, which dtype and which of these columns make up each member.
+under `wsm.members`, which dtype and which of these columns make up each member. A member that a clip does not have has
+offset, size and checksum 0.
 """
 
 from collections.abc import Mapping
@@ -14,7 +15,7 @@ import pyarrow as pa
 
 from wsm_data.errors import IntegrityError
 from wsm_data.files.jsonlines import canonical_json
-from wsm_data.schema.clip import MEMBERS, META_MEMBER
+from wsm_data.schema.clip import DEPTH_MEMBERS, MEMBERS, META_MEMBER
 from wsm_data.shards.fragment import FragmentInfo
 from wsm_data.shards.members import MEMBER_NAMES, META, STORED_DTYPES, Member, lay_out
 from wsm_data.shards.names import INDEX_NAME
@@ -153,6 +154,7 @@ def row_record(row: IndexRow) -> dict[str, Any]:
     record = {name: getattr(row, name) for name in (*UNIQUE_COLUMNS, *REPEATED_COLUMNS, "position", "padded_frames")}
     record |= {column: row.axes[axis] for axis, column in AXIS_COLUMNS.items()}
     record |= {"clip_offset": row.clip_offset, "clip_size": row.clip_size}
+    record |= {f"{name}_{what}": 0 for name in DEPTH_MEMBERS for what in ("offset", "size", "checksum")}
     for member in row.members:
         record[f"{member.name}_offset"] = row.clip_offset + member.array_offset
         record[f"{member.name}_size"] = member.array_size
@@ -181,7 +183,7 @@ def _row(record: Mapping[str, Any]) -> IndexRow:
         record["key"],
         axes=axes,
         meta_size=record[f"{META}_size"],
-        checksums={name: f"{record[f'{name}_checksum']:016x}" for name in MEMBER_NAMES},
+        checksums={name: f"{record[f'{name}_checksum']:016x}" for name in MEMBER_NAMES if _is_there(name, record)},
     )
     return IndexRow(
         **{name: record[name] for name in (*UNIQUE_COLUMNS, *REPEATED_COLUMNS, "position", "padded_frames")},
@@ -190,6 +192,10 @@ def _row(record: Mapping[str, Any]) -> IndexRow:
         members=members,
         axes=axes,
     )
+
+
+def _is_there(name: str, record: Mapping[str, Any]) -> bool:
+    return name not in DEPTH_MEMBERS or record[f"{name}_size"] > 0
 
 
 def _contradiction(record: Mapping[str, Any]) -> IntegrityError:

@@ -58,7 +58,7 @@ class ReleaseManifest:
         quarantine_sha256: digest of quarantine.jsonl.
         codec: the codec of all clips.
         rgb_statistics: of the colour latents of the training split.
-        depth_statistics: of the depth latents of the training split.
+        depth_statistics: of the depth latents of the training split, of those clips that have depth.
         depth_range: metric range of the log-depth normalisation of all clips.
         encoded_width_px: width of the images that were encoded, px.
         encoded_height_px: height of the images that were encoded, px.

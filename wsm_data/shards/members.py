@@ -66,16 +66,17 @@ def shape_of(name: str, axes: Mapping[str, int]) -> tuple[int, ...]:
 def axes_of(arrays: Mapping[str, np.ndarray]) -> dict[str, int]:
     """Lengths of the axes F, C, h, w, T, Y, X of a clip's arrays."""
     lengths: dict[str, int] = {}
-    for name, (_, axes) in MEMBERS.items():
-        lengths.update({axis: length for axis, length in zip(axes, arrays[name].shape, strict=True) if axis != "7"})
+    for name, array in arrays.items():
+        axes = MEMBERS[name][1]
+        lengths.update({axis: length for axis, length in zip(axes, array.shape, strict=True) if axis != "7"})
     return lengths
 
 
 def lay_out(key: str, *, axes: Mapping[str, int], meta_size: int, checksums: Mapping[str, str]) -> tuple[Member, ...]:
-    """Members of a clip: equal arguments, equal places, in every release."""
+    """Members of a clip, those that have a checksum: equal arguments, equal places, in every release."""
     members: list[Member] = []
     offset = 0
-    for name in MEMBER_NAMES:
+    for name in (one for one in MEMBER_NAMES if one in checksums):
         member = _place(key, name, axes=axes, meta_size=meta_size, checksum=checksums[name], offset=offset)
         members.append(member)
         offset = member.end_offset

@@ -81,10 +81,11 @@ def latent_sums(latent: Float16Array) -> LatentSums:
     )
 
 
-def clip_sums(clip: Clip) -> tuple[LatentSums, LatentSums]:
-    """Sums of a clip's colour and depth latents, padding left out."""
+def clip_sums(clip: Clip) -> tuple[LatentSums, LatentSums | None]:
+    """Sums of a clip's colour and depth latents, padding left out; None for the depth that it does not have."""
     real = real_latents(clip.frame_count, clip.meta.padded_frames)
-    return latent_sums(clip.rgb_latent[:real]), latent_sums(clip.depth_latent[:real])
+    depth = clip.depth_latent
+    return latent_sums(clip.rgb_latent[:real]), None if depth is None else latent_sums(depth[:real])
 
 
 def merge_sums(sums: Iterable[LatentSums]) -> LatentSums | None:

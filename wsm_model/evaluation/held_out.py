@@ -76,12 +76,13 @@ def estimate_states(model: WorldSlamModel, rgb_FChw: Tensor, config: SessionConf
 
 
 def clip_errors(model: WorldSlamModel, batch: ClipBatch[Tensor], config: SessionConfig) -> list[ClipErrors]:
-    """Errors of every clip of a batch."""
+    """Errors of every clip of a batch that has depth."""
+    if batch.depth is None:
+        raise ValueError("errors of states need a batch with depth, found one without")
     found = []
     for number, span in enumerate(batch.spans):
         place = span.place
         depth, poses = estimate_states(model, batch.rgb[place].float(), config)
-        true_depth = batch.depth[place].float()
         recorded = ~batch.still[place].flatten()[-len(raw_frame_poses(poses)) :].cpu()
         estimated, true = (
             raw_frame_poses(slots.float().cpu())[recorded, :3].double().numpy() for slots in (poses, batch.poses[place])
@@ -92,8 +93,8 @@ def clip_errors(model: WorldSlamModel, batch: ClipBatch[Tensor], config: Session
                 ate_rmse_unaligned_m=ate_rmse_unaligned_m(estimated, true),
                 ate_rmse_zero_motion_m=ate_rmse_unaligned_m(zero_motion(true), true),
                 ate_rmse_constant_velocity_m=ate_rmse_unaligned_m(constant_velocity(true), true),
-                depth_mse=float((depth - true_depth).square().mean()),
-                mean_depth_mse=float(true_depth.square().mean()),
+                depth_mse=float((depth - batch.depth[place].float()).square().mean()),
+                mean_depth_mse=float(batch.depth[place].float().square().mean()),
             )
         )
     return found

@@ -102,7 +102,7 @@ def pretraining_loss(
     real, dreamed = counted_frames(inputs.table, device)
     errors = flow_errors(outputs.velocity, inputs.rgb, noise, inputs.flow_time, config.flow_shift)
     parts = {"flow": _sum_where(errors, dreamed) / max(1.0, counts.dreamed)}
-    if outputs.depth is not None:
+    if outputs.depth is not None and inputs.depth is not None:
         squared = (outputs.depth.float() - inputs.depth.float()).square().flatten(2).mean(-1)
         parts["depth"] = _sum_where(squared, real) / counts.latents
     parts |= _pose_parts(inputs, outputs, config, counts)

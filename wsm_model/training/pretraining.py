@@ -73,7 +73,8 @@ def _precision(precision: Precision, device: torch.device) -> AbstractContextMan
 
 
 def _not_finite(batch: ClipBatch[Tensor], wrong: str, bad: list[str]) -> str:
-    inputs = [name for name in ("rgb", "depth", "poses", "goal_camera0_m") if not _finite(getattr(batch, name))]
+    given = {name: getattr(batch, name) for name in ("rgb", "depth", "poses", "goal_camera0_m")}
+    inputs = [name for name, values in given.items() if values is not None and not _finite(values)]
     cause = f"the batch itself holds NaN or infinity in {', '.join(inputs)}" if inputs else "the batch is finite"
     return (
         f"epoch {batch.epoch}, step {batch.step}: losses and gradients must be finite, found {wrong} not "

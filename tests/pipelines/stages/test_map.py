@@ -90,7 +90,7 @@ def test_the_output_of_a_scene_is_its_map_and_the_facts_name_its_floors(finished
         assert levels == {DEN: [0.0], HALL: [0.0, 3.0], ZED: [0.0]}[name]
         assert outcome.facts["floors"] == len(levels)
         assert outcome.facts["levels"] == [[z, scene_map_digest(scene_map, z)] for z in levels]
-        assert outcome.facts["fused_from_depth"] == (name == DEN)
+        assert outcome.facts["map_from"] == ("depth" if name == DEN else "cloud")
 
 
 def test_equal_scenes_have_equal_floors_whichever_camera_saw_them_and_whatever_is_above(finished):

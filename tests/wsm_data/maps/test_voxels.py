@@ -4,9 +4,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wsm_data.errors import DataError, IntegrityError, Reason
-from wsm_data.maps.voxels import load_voxels, save_voxels, voxels_digest, voxels_from_cloud, voxels_from_depth
+from wsm_data.maps.voxels import (
+    load_voxels,
+    no_voxels,
+    save_voxels,
+    voxels_digest,
+    voxels_from_cloud,
+    voxels_from_depth,
+)
 from wsm_data.schema.dataset import CloudColours
 from wsm_data.schema.point_cloud import PointCloud
+from wsm_data.schema.surface import SurfaceVoxels
 
 GREY, OBSTACLE, BLACK = (128, 128, 128), (0, 0, 128), (0, 0, 0)
 
@@ -147,3 +155,10 @@ def test_a_file_with_boxes_of_another_kind_is_an_integrity_error(tmp_path):
     np.savez(tmp_path / "x.npz", cells=np.zeros((2, 2), np.int16), obstacle=np.zeros(2, bool), origin=np.array("cloud"))
     with pytest.raises(IntegrityError, match="cells must be int16"):
         load_voxels(tmp_path / "x.npz")
+
+
+def test_a_scene_that_nothing_shows_has_no_boxes_and_says_so(tmp_path):
+    save_voxels(tmp_path / "surface.npz", no_voxels())
+    assert load_voxels(tmp_path / "surface.npz").origin == "path"
+    with pytest.raises(ValueError, match="must have no box, found 1"):
+        SurfaceVoxels(cells=np.zeros((1, 3), np.int16), obstacle=np.zeros(1, bool), origin="path")

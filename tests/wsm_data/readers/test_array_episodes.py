@@ -56,6 +56,26 @@ def test_thinning_and_cutting_are_those_of_the_manifest(tmp_path, dataset):
     )
 
 
+def test_a_stated_goal_is_that_of_the_last_piece_and_earlier_pieces_lead_to_where_they_end(tmp_path, dataset):
+    goal = (0.05, 0.75, 0.8)
+    write_episode(tmp_path, "kitchen", "one", frames(8), K=K, floor_z_m=0.0, goal_world_m=goal)
+    _, found = scan(tmp_path, replace(dataset, motion=Motion(carried_by="hand", max_frames=4)))
+    first, last = found.records
+    assert (first.goal_world_m, last.goal_world_m) == (None, goal)
+    assert first.goal_m.tolist() == first.T_world_camera[-1, :3, 3].tolist()
+    assert last.goal_m.tolist() == list(goal)
+
+
+def test_an_episode_without_depth_gives_records_without_depth(tmp_path, dataset):
+    bare = [(rgb, None, T) for rgb, _, T in frames()]
+    write_episode(tmp_path, "kitchen", "one", bare, K=K, floor_z_m=0.0)
+    container, found = scan(tmp_path, dataset)
+    (record,) = found.records
+    assert not record.has_depth
+    ((_, images),) = ARRAYS.iter_frames(tmp_path, container, dataset, found.records)
+    assert set(images.depth) == {None}
+
+
 @pytest.mark.parametrize("damage", ["{", "{}", '{"T_world_camera": [1], "K": 2}'])
 def test_a_damaged_episode_is_refused_and_the_other_goes_on(tmp_path, dataset, damage):
     for name in ("one", "two"):

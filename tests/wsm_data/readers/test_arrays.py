@@ -66,6 +66,20 @@ def test_an_episode_that_is_refused_leaves_the_older_one_as_it_was(tmp_path):
     assert (folder / EPISODE_FILE).read_bytes() == before
 
 
+def test_depth_is_in_all_frames_of_an_episode_or_in_none_and_without_it_the_floor_is_stated(tmp_path):
+    bare = frame(depth_m=None)
+    folder = write_episode(tmp_path, "kitchen", "one", [bare, bare], K=K, floor_z_m=0.0, goal_world_m=(1.0, 2.0, 0.5))
+    said = json.loads((folder / EPISODE_FILE).read_text())
+    assert (said["depth"], said["goal_world_m"]) == (False, [1.0, 2.0, 0.5])
+    assert not (folder / "depth").exists()
+    with pytest.raises(ValueError, match="or none, found 1 of 2"):
+        write_episode(tmp_path, "kitchen", "one", [frame(), bare], K=K, floor_z_m=0.0)
+    with pytest.raises(ValueError, match="floor_z_m must be given"):
+        write_episode(tmp_path, "kitchen", "one", [bare], K=K)
+    with pytest.raises(ValueError, match="goal_world_m must be finite"):
+        write_episode(tmp_path, "kitchen", "one", [bare], K=K, floor_z_m=0.0, goal_world_m=(0.0, np.inf, 0.0))
+
+
 @pytest.mark.parametrize(
     ("matrix", "said"),
     [(np.eye(4), "K must be float64"), (K + 1, "K must be"), (K * [[20], [20], [1]], "another image size")],

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from wsm_data.schema.clip import MEMBERS, UNREACHABLE_MM, Clip
+from wsm_data.schema.clip import DEPTH_MEMBERS, MEMBERS, UNREACHABLE_MM, Clip
 
 
 def test_a_valid_clip_knows_its_lengths(clip_fields):
@@ -128,3 +128,11 @@ def test_the_member_table_is_the_one_of_the_format():
         "expert_distance": "float32 T",
     }
     assert np.iinfo(MEMBERS["geodesic_mm"][0]).max == UNREACHABLE_MM
+
+
+def test_depth_is_there_with_its_validity_or_not_at_all(clip_fields):
+    bare = Clip(**{name: value for name, value in clip_fields.items() if name not in DEPTH_MEMBERS})
+    assert not bare.has_depth
+    assert list(bare.arrays()) == [name for name in MEMBERS if name not in DEPTH_MEMBERS]
+    with pytest.raises(ValueError, match="must be there both, or neither"):
+        Clip(**{**clip_fields, "depth_valid": None})

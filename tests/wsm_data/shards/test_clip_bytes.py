@@ -90,3 +90,21 @@ def test_a_name_too_long_to_store_is_refused(make_clip: Callable[..., Clip]) -> 
 def test_meta_data_under_another_key_than_their_own_are_a_bug(make_clip: Callable[..., Clip]) -> None:
     with pytest.raises(ValueError, match="must be that of its id"):
         encode_clip(make_clip(key="other"))
+
+
+def test_a_clip_without_depth_comes_back_without_its_members(make_clip: Callable[..., Clip]) -> None:
+    clip = replace(make_clip(), depth_latent=None, depth_valid=None)
+    data, members = encode_clip(clip)
+    with tarfile.open(fileobj=io.BytesIO(data + bytes(1024))) as archive:
+        names = [name.removeprefix(f"{clip.meta.key}.") for name in archive.getnames()]
+    assert names == [
+        "rgb_latent.npy",
+        "poses.npy",
+        "occupancy.npy",
+        "geodesic_mm.npy",
+        "expert_distance.npy",
+        "meta.json",
+    ]
+    again = decode_clip(memoryview(data), members, "here")
+    assert (again.depth_latent, again.depth_valid) == (None, None)
+    assert np.array_equal(again.poses, clip.poses)

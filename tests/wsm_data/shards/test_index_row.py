@@ -4,7 +4,7 @@ from dataclasses import replace
 import pytest
 
 from wsm_data.errors import IntegrityError
-from wsm_data.schema.clip import Clip
+from wsm_data.schema.clip import DEPTH_MEMBERS, Clip
 from wsm_data.shards.fragment import build_fragment
 from wsm_data.shards.index_row import SCHEMA, IndexRow, index_row, parse_row, row_record
 from wsm_data.shards.members import MEMBER_NAMES
@@ -57,3 +57,14 @@ def test_the_documentation_lists_every_column(words_of_table: Callable[[str], li
     for word in words_of_table("## index.parquet"):
         listed += [word.replace("<member>", name) for name in MEMBER_NAMES] if "<member>" in word else [word]
     assert sorted(listed) == sorted(SCHEMA.names)
+
+
+def test_members_that_a_clip_does_not_have_are_zeros_and_come_back_absent(make_clip: Callable[..., Clip]) -> None:
+    info = build_fragment(replace(make_clip(), depth_latent=None, depth_valid=None)).info
+    row = index_row(info, split="train", shard="train-000000.tar", position=0, clip_offset=512)
+    record = row_record(row)
+    absent = [record[f"{name}_{what}"] for name in DEPTH_MEMBERS for what in ("offset", "size", "checksum")]
+    assert absent == [0] * 6
+    assert parse_row(record) == row
+    with pytest.raises(IntegrityError, match="restore the index"):
+        parse_row({**record, "depth_latent_offset": 512})

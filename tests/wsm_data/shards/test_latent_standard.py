@@ -25,7 +25,12 @@ def test_statistics_of_the_codec_come_before_those_of_the_release(tiny):
     assert found.depth_mean == tiny.manifest.depth_statistics.mean
 
 
-@pytest.mark.parametrize("statistics", ["rgb_statistics", "depth_statistics"])
-def test_a_release_without_statistics_has_no_standard(tiny, statistics):
+def test_a_release_without_statistics_has_no_standard(tiny):
     with pytest.raises(ConfigError, match=r"release tiny must have latent statistics.*name a release with a split"):
-        latent_standard(replace(tiny.manifest, **{statistics: NO_STATISTICS}))
+        latent_standard(replace(tiny.manifest, rgb_statistics=NO_STATISTICS))
+
+
+def test_a_release_without_depth_has_a_standard_of_colour_alone(tiny):
+    found = latent_standard(replace(tiny.manifest, depth_statistics=NO_STATISTICS))
+    assert (found.depth_mean, found.depth_std) == ((), ())
+    assert found.rgb_mean == tiny.manifest.rgb_statistics.mean

@@ -11,8 +11,10 @@ _LIMIT = 0.98
 """Decoded log-depth 2u - 1 this near to 1 or -1 is at the limit: depths beyond 4.84 m, or nearer than 0.207 m."""
 
 
-def invalid_share(images: ClipImages) -> float:
-    """Share of depth pixels without a measurement."""
+def invalid_share(images: ClipImages) -> float | None:
+    """Share of depth pixels without a measurement; None where there is no depth."""
+    if images.depth_valid is None:
+        return None
     return 1.0 - float(images.depth_valid.sum(dtype=np.int64)) / (_FULL * images.depth_valid.size)
 
 
@@ -22,7 +24,7 @@ def saturated_share(images: ClipImages) -> float | None:
     Pixels without a measurement are encoded as the far limit, so those of each latent cell are taken off the pixels
     of that cell that lie there. None where no depth was decoded.
     """
-    if not len(images.sampled):
+    if images.depth_valid is None or not len(images.sampled):
         return None
     frames, height, width = images.sampled_depth.shape
     valid = images.depth_valid[images.sampled] / _FULL
@@ -39,6 +41,7 @@ DEPTH_INVALID = Scorer(
         unit="share",
         direction=Direction.HIGHER,
         summary="share of depth pixels without a measurement",
+        absent="the clip has no depth",
     ),
     score=invalid_share,
 )
@@ -48,7 +51,7 @@ DEPTH_SATURATED = Scorer(
         unit="share",
         direction=Direction.HIGHER,
         summary="share of measured depth pixels at the limits of the depth range, in a few decoded frames",
-        absent="depth was not decoded: it was not asked for, or the codec cannot decode a latent on its own",
+        absent="the clip has no depth, or it was not decoded: not asked for, or a codec that decodes no latent alone",
     ),
     score=saturated_share,
 )

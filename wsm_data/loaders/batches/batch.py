@@ -65,6 +65,7 @@ class BatchLayout:
         sequences: N.
         latent_shape: channels, height and width of a latent.
         dtype: dtype of the latents.
+        depth: whether there is depth.
     """
 
     rows: int
@@ -72,6 +73,7 @@ class BatchLayout:
     sequences: int
     latent_shape: tuple[int, int, int]
     dtype: torch.dtype
+    depth: bool
 
     @cached_property
     def tensors(self) -> Mapping[str, TensorPlace]:
@@ -87,6 +89,8 @@ class BatchLayout:
             "latent_index": (torch.int32, latents),
             "goal_camera0_m": (torch.float32, (self.sequences, 3)),
         }
+        if not self.depth:
+            del shapes["depth"], shapes["depth_valid"]
         places: dict[str, TensorPlace] = {}
         offset = 0
         for name, (dtype, shape) in shapes.items():
@@ -113,10 +117,18 @@ class BatchLayout:
 
 @lru_cache(maxsize=64)
 def layout_of(
-    rows: int, row_latents: int, sequences: int, latent_shape: tuple[int, int, int], dtype: torch.dtype
+    rows: int,
+    row_latents: int,
+    sequences: int,
+    latent_shape: tuple[int, int, int],
+    dtype: torch.dtype,
+    *,
+    depth: bool = True,
 ) -> BatchLayout:
     """The layout of these sizes; most batches of a run share one."""
-    return BatchLayout(rows=rows, row_latents=row_latents, sequences=sequences, latent_shape=latent_shape, dtype=dtype)
+    return BatchLayout(
+        rows=rows, row_latents=row_latents, sequences=sequences, latent_shape=latent_shape, dtype=dtype, depth=depth
+    )
 
 
 def _aligned(offset: int) -> int:

@@ -62,10 +62,12 @@ def batch_layout(
     epoch_order: EpochOrder,
     latent_shape: tuple[int, int, int],
     dtype: torch.dtype,
+    *,
+    depth: bool = True,
 ) -> BatchLayout:
     """The sizes of a batch: rows as long as the longest one, or of `row_latents` of joined clips; never empty."""
     longest = max((clip.span.end for clip in clips), default=1)
-    return layout_of(rows, epoch_order.config.row_latents or longest, len(clips), latent_shape, dtype)
+    return layout_of(rows, epoch_order.config.row_latents or longest, len(clips), latent_shape, dtype, depth=depth)
 
 
 def slots_of(block: BatchBlock, clip: BatchSequence) -> dict[str, memoryview]:
@@ -78,6 +80,7 @@ def slots_of(block: BatchBlock, clip: BatchSequence) -> dict[str, memoryview]:
     slots = {
         member: block.bytes[_stretch(block.layout, name, span.row, span.start, span.length)]
         for name, member in MEMBER_OF.items()
+        if name in block.layout.tensors
     }
     slots["poses"] = slots["poses"][ANCHOR_SLOTS * POSE_BYTES :]
     return slots
@@ -113,7 +116,7 @@ def describe(block: BatchBlock, clips: Sequence[BatchSequence], goals: Sequence[
 def _clear(layout: BatchLayout, memory: memoryview, row: int, end: int) -> None:
     """Zeros behind the last sequence of a row."""
     unused = layout.row_latents - end
-    for name in MEMBER_OF if unused else ():
+    for name in (one for one in MEMBER_OF if unused and one in layout.tensors):
         np.frombuffer(memory[_stretch(layout, name, row, end, unused)], np.uint8)[:] = 0
 
 

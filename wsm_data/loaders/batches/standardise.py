@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
+from wsm_data.errors import ConfigError
 from wsm_data.shards.latent_standard import latent_standard
 from wsm_data.shards.manifest import ReleaseManifest
 
@@ -57,17 +58,22 @@ def convert(stored: torch.Tensor, out: torch.Tensor, standardisation: Standardis
             target.copy_(values)
 
 
-def standardisations(manifest: ReleaseManifest) -> Mapping[str, Standardisation]:
-    """How `rgb` and `depth` latents of a release are standardised.
+def standardisations(manifest: ReleaseManifest, *, depth: bool = True) -> Mapping[str, Standardisation]:
+    """How `rgb` and, where it is asked for, `depth` latents of a release are standardised.
 
     Raises:
-        ConfigError: the release has no statistics, for want of training clips.
+        ConfigError: the release has no statistics, for want of training clips or of their depth.
     """
     standard = latent_standard(manifest)
-    return {
-        "rgb": _standardisation(standard.rgb_mean, standard.rgb_std),
-        "depth": _standardisation(standard.depth_mean, standard.depth_std),
-    }
+    rgb = {"rgb": _standardisation(standard.rgb_mean, standard.rgb_std)}
+    if not depth:
+        return rgb
+    if not standard.depth_mean:
+        raise ConfigError(
+            f"the release {manifest.name} must have depth to deliver it, and no clip of its split `train` has any; set "
+            "depth = false where batches need none"
+        )
+    return {**rgb, "depth": _standardisation(standard.depth_mean, standard.depth_std)}
 
 
 def _standardisation(mean: tuple[float, ...], std: tuple[float, ...]) -> Standardisation:

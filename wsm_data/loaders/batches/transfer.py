@@ -30,14 +30,14 @@ def device_of(read: ReadConfig) -> torch.device:
     return device
 
 
-def open_transfer(read: ReadConfig, manifest: ReleaseManifest) -> Callable[[BatchBlock], Batch]:
+def open_transfer(read: ReadConfig, manifest: ReleaseManifest, *, depth: bool = True) -> Callable[[BatchBlock], Batch]:
     """What makes batches of blocks, to be called where blocks are read; latents must come as they are stored for a GPU.
 
     Raises:
         ConfigError: the device is not there.
     """
     device = device_of(read)
-    return BatchBlock.batch if device.type == "cpu" else CudaTransfer(device, read, manifest)
+    return BatchBlock.batch if device.type == "cpu" else CudaTransfer(device, read, manifest, depth=depth)
 
 
 class CudaTransfer:
@@ -47,9 +47,9 @@ class CudaTransfer:
     block may be used again when its batch is delivered.
     """
 
-    def __init__(self, device: torch.device, read: ReadConfig, manifest: ReleaseManifest):
+    def __init__(self, device: torch.device, read: ReadConfig, manifest: ReleaseManifest, *, depth: bool = True):
         self._device, self._dtype = device, LATENT_DTYPES[read.dtype]
-        self._standardise = standardisations(manifest) if read.standardise else {}
+        self._standardise = standardisations(manifest, depth=depth) if read.standardise else {}
         self._stream = torch.cuda.Stream(device)
 
     def __call__(self, block: BatchBlock) -> Batch:
@@ -82,12 +82,14 @@ def on_device(
             return latents.to(dtype)
         return standardise[name].whole(latents, dtype).masked_fill_(padding, 0)
 
-    return replace(batch, rgb=finished("rgb", batch.rgb), depth=finished("depth", batch.depth))
+    depth = None if batch.depth is None else finished("depth", batch.depth)
+    return replace(batch, rgb=finished("rgb", batch.rgb), depth=depth)
 
 
 def hand_over(batch: Batch) -> Batch:
     """Give a batch to the thread that trains: what its stream still uses is not reused on another."""
     if batch.rgb.is_cuda:
-        for tensor in (batch.rgb, batch.depth, batch.depth_valid):  # the last one stands for the block
-            tensor.record_stream(torch.cuda.current_stream(tensor.device))
+        for tensor in (batch.rgb, batch.depth, batch.poses):  # the last one stands for the block
+            if tensor is not None:
+                tensor.record_stream(torch.cuda.current_stream(tensor.device))
     return batch

@@ -11,11 +11,11 @@ from wsm_data.access.local_shards import LocalShards
 from wsm_data.access.ranges import open_remote_store, read_exactly
 from wsm_data.files.fsspec_store import FsspecStore
 from wsm_data.files.stores import LocalStore
-from wsm_data.loaders.batches.batch import LATENT_TENSORS, Batch
+from wsm_data.loaders.batches.batch import Batch
 from wsm_data.loaders.config import LoaderConfig, ReadConfig
 from wsm_data.loaders.doctor.diagnosis import LoaderRun, SourceFacts
 from wsm_data.loaders.loader import ClipLoader
-from wsm_data.loaders.reading.clip_places import ClipPlace, clip_places, span_of
+from wsm_data.loaders.reading.clip_places import READ_MEMBERS, RGB_MEMBERS, ClipPlace, clip_places, span_of
 from wsm_data.loaders.reading.clip_reads import POSE_BYTES
 from wsm_data.loaders.sources.clips import Sources, SourceTable
 from wsm_data.schema.sequence import POSE_SLOTS
@@ -59,7 +59,8 @@ def examine(
             time.sleep(step_s)
         elapsed_s, after = time.perf_counter() - start, loader.timing.seconds()
         stream.close()
-        places = clip_places(loader.sources, np.concatenate(refs))
+        members = READ_MEMBERS if config.depth else RGB_MEMBERS
+        places = clip_places(loader.sources, np.concatenate(refs), members)
         run = LoaderRun(
             clips=len(places) - len(refs[0]),
             stored_bytes=stored_bytes,
@@ -103,7 +104,9 @@ def _shards(table: SourceTable) -> dict[str, int]:
 def _stored_bytes(batch: Batch) -> int:
     """Bytes that the latents and poses of a batch take in the shards."""
     channels, height, width = batch.rgb.shape[2:]
-    of_cells = (len(LATENT_TENSORS) * channels * _STORED_ITEM_BYTES + 1) * height * width
+    of_cells = channels * _STORED_ITEM_BYTES * height * width
+    if batch.depth is not None:
+        of_cells += (channels * _STORED_ITEM_BYTES + 1) * height * width
     return sum(span.length for span in batch.spans) * (of_cells + POSE_SLOTS * POSE_BYTES)
 
 

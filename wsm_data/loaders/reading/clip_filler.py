@@ -33,7 +33,9 @@ class ClipFiller:
         dtype: dtype of the latents of the batches that are filled.
     """
 
-    def __init__(self, sources: Sources, read: ReadConfig, readers: Sequence[ShardReader], timing: Timing):
+    def __init__(
+        self, sources: Sources, read: ReadConfig, readers: Sequence[ShardReader], timing: Timing, *, depth: bool = True
+    ):
         """Look up what latents are, and how they are standardised.
 
         Args:
@@ -41,6 +43,7 @@ class ClipFiller:
             read: the settings.
             readers: of the shards of each source.
             timing: adds up the time of reading, checking and standardising.
+            depth: whether batches have depth.
 
         Raises:
             ConfigError: a dtype that latents cannot have, or no statistics to standardise by.
@@ -53,9 +56,10 @@ class ClipFiller:
         as_stored = torch.device(read.device).type != "cpu"  # not looked for: a forked process must not ask for it
         self.latent_shape = (codec.channels, *cells)
         self.dtype = _STORED if as_stored else LATENT_DTYPES[read.dtype]
-        self._standardise = standardisations(manifest) if read.standardise and not as_stored else {}
+        self._standardise = standardisations(manifest, depth=depth) if read.standardise and not as_stored else {}
         if self._standardise and len({table.release.store.root for table in sources.tables}) > 1:
             _LOG.warning("latents of all sources are standardised by the statistics of the first, %s", manifest.name)
+        self._latents = LATENT_TENSORS if depth else LATENT_TENSORS[:1]
         self._converts = self.dtype is not _STORED or bool(self._standardise)
         self._verification = verification_of(sources.tables, read)
         self._readers, self._timing = readers, timing
@@ -88,9 +92,9 @@ class ClipFiller:
 
     def _staged(self, latents: int) -> dict[str, torch.Tensor]:
         """Memory of this thread for the stored latents of a clip; it stays in the cache from clip to clip."""
-        shape = (len(LATENT_TENSORS), latents, *self.latent_shape)
+        shape = (len(self._latents), latents, *self.latent_shape)
         size = prod(shape)
         held = getattr(self._staging, "held", None)
         if held is None or len(held) < size:
             held = self._staging.held = torch.empty(size, dtype=_STORED)
-        return dict(zip(LATENT_TENSORS, held[:size].view(shape), strict=True))
+        return dict(zip(self._latents, held[:size].view(shape), strict=True))

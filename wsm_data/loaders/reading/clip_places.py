@@ -7,16 +7,16 @@ import numpy as np
 
 from wsm_data.access.shard_reader import Span
 from wsm_data.loaders.sources.clips import Sources
+from wsm_data.schema.clip import DEPTH_MEMBERS
 from wsm_data.schema.sequence import frames_of
 
 READ_MEMBERS = ("rgb_latent", "depth_latent", "depth_valid", "poses")
 """Members that batches are made of, in stored order."""
 
-_EACH = len(READ_MEMBERS)
-_COLUMNS = (
-    *("key", "shard", "latents", "padded_frames", "clip_offset"),
-    *(f"{name}_{what}" for what in ("offset", "size", "checksum") for name in READ_MEMBERS),
-)
+RGB_MEMBERS = tuple(name for name in READ_MEMBERS if name not in DEPTH_MEMBERS)
+"""Those of batches without depth."""
+
+_SINGLE = ("key", "shard", "latents", "padded_frames", "clip_offset")
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -31,7 +31,8 @@ class ClipPlace:
         latents: F, latent frames of the whole clip.
         padded_frames: still frames at its end.
         clip_offset: first byte of the clip in the shard.
-        offsets: first byte of each of `READ_MEMBERS` in the shard.
+        members: names of the members that are read, in stored order.
+        offsets: first byte of each of them in the shard.
         sizes: bytes of each.
         checksums: xxh3_64 of each.
     """
@@ -43,6 +44,7 @@ class ClipPlace:
     latents: int
     padded_frames: int
     clip_offset: int
+    members: tuple[str, ...]
     offsets: tuple[int, ...]
     sizes: tuple[int, ...]
     checksums: tuple[int, ...]
@@ -59,22 +61,24 @@ class ClipPlace:
 
     @property
     def gaps(self) -> tuple[int, ...]:
-        """Bytes in front of each member: padding of the one before, and headers."""
+        """Bytes in front of each member: padding of the one before and headers, and members that are not read."""
         ends = (self.clip_offset, *map(add, self.offsets, self.sizes))
         return tuple(map(sub, self.offsets, ends))
 
 
-def clip_places(sources: Sources, refs: np.ndarray) -> list[ClipPlace]:
-    """Places of clips, in the order of their refs; int64 [N]."""
+def clip_places(sources: Sources, refs: np.ndarray, members: tuple[str, ...] = READ_MEMBERS) -> list[ClipPlace]:
+    """Places of some members of clips, in the order of their refs; int64 [N]."""
+    each, in_stored = len(members), ("offset", "size", "checksum")
+    wanted = (*_SINGLE, *(f"{name}_{what}" for what in in_stored for name in members))
     places: list[ClipPlace | None] = [None] * len(refs)
     for source, table in enumerate(sources.tables):
         own = np.flatnonzero((refs >= table.base) & (refs < table.base + len(table)))
         numbers = refs[own] - table.base
         if not len(own):
             continue
-        columns = [values.tolist() for values in table.values(_COLUMNS, numbers)]
-        single, members = columns[: -3 * _EACH], columns[-3 * _EACH :]
-        of_members = [zip(*members[first : first + _EACH], strict=True) for first in range(0, 3 * _EACH, _EACH)]
+        columns = [values.tolist() for values in table.values(wanted, numbers)]
+        single, several = columns[: len(_SINGLE)], columns[len(_SINGLE) :]
+        of_members = [zip(*several[first : first + each], strict=True) for first in range(0, 3 * each, each)]
         found = zip(own.tolist(), numbers.tolist(), *single, *of_members, strict=True)
         for place, number, key, shard, latents, padded_frames, clip_offset, offsets, sizes, checksums in found:
             places[place] = ClipPlace(
@@ -85,6 +89,7 @@ def clip_places(sources: Sources, refs: np.ndarray) -> list[ClipPlace]:
                 latents=latents,
                 padded_frames=padded_frames,
                 clip_offset=clip_offset,
+                members=members,
                 offsets=offsets,
                 sizes=sizes,
                 checksums=checksums,

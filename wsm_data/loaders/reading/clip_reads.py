@@ -1,7 +1,8 @@
 """One clip from its shard into memory that the caller owns: which bytes go where, and whether they are the right ones.
 
 The members that a batch needs stand one after the other in the shard, with their headers between them. One scattered
-read puts each of them where it belongs; what lies between goes into memory that nobody looks at.
+read puts each of them where it belongs; what lies between goes into memory that nobody looks at. Depth that nobody
+asked for is passed over.
 """
 
 from collections.abc import Mapping, Sequence
@@ -45,7 +46,7 @@ def read_clip(
         reader: of the release's shards.
         place: the clip.
         latent_shape: channels, height and width of a latent.
-        slots: by name of each of `READ_MEMBERS`, memory for its leading bytes, all of them or fewer.
+        slots: by name of each of the place's members, memory for its leading bytes, all of them or fewer.
         checked: compare headers and checksums; for this, members are read to their end.
         timing: adds up the time of reading and of checking.
 
@@ -58,8 +59,9 @@ def read_clip(
     """
     shapes, sizes = _shapes_and_sizes(place.latents, latent_shape)
     _require_sound(place, sizes)
-    in_order = [slots[name] for name in READ_MEMBERS]
-    headers = [memoryview(bytearray(size)) for size in place.gaps] if checked else []
+    in_order = [slots[name] for name in place.members]
+    wanted = _headers(place, shapes) if checked else []
+    headers = [memoryview(bytearray(min(len(one), gap))) for one, gap in zip(wanted, place.gaps, strict=False)]
     tails = _tails(place, in_order) if checked else _last_pose(place, in_order)
     pieces = _pieces(place, headers, in_order, tails)
 
@@ -71,7 +73,7 @@ def read_clip(
         if not checked:
             return None
         with timing.measure(Part.CHECKSUM):
-            return _damage(place, shapes, headers, in_order, tails)
+            return _damage(place, wanted, headers, in_order, tails)
 
     read_until_whole(reader, place.shard, place.key, read=read, damage=damage)
     return np.frombuffer((tails[-1] if tails[-1].nbytes else in_order[-1])[-POSE_BYTES:], STORED_DTYPES["poses"])
@@ -85,18 +87,29 @@ def _tails(place: ClipPlace, slots: Sequence[memoryview]) -> list[memoryview]:
 def _last_pose(place: ClipPlace, slots: Sequence[memoryview]) -> list[memoryview]:
     """Memory for the one thing that is needed behind a prefix: the pose at the end of the clip."""
     size = min(place.sizes[-1] - slots[-1].nbytes, POSE_BYTES)
-    return [_NOTHING, _NOTHING, _NOTHING, memoryview(bytearray(size))]
+    return [*[_NOTHING] * (len(slots) - 1), memoryview(bytearray(size))]
 
 
 @lru_cache(maxsize=4096)
 def _shapes_and_sizes(
     latents: int, latent_shape: tuple[int, int, int]
-) -> tuple[tuple[tuple[int, ...], ...], tuple[int, ...]]:
-    """Shape, and bytes, of each member that is read of a clip of so many latents."""
+) -> tuple[Mapping[str, tuple[int, ...]], Mapping[str, int]]:
+    """Shape, and bytes, of each member of a clip of so many latents that batches may need."""
     axes = dict(zip("FChwT", (latents, *latent_shape, frames_of(latents)), strict=True))
-    shapes = tuple(shape_of(name, axes) for name in READ_MEMBERS)
-    sizes = (prod(shape) * STORED_DTYPES[name].itemsize for name, shape in zip(READ_MEMBERS, shapes, strict=True))
-    return shapes, tuple(sizes)
+    shapes = {name: shape_of(name, axes) for name in READ_MEMBERS}
+    return shapes, {name: prod(shape) * STORED_DTYPES[name].itemsize for name, shape in shapes.items()}
+
+
+def _headers(place: ClipPlace, shapes: Mapping[str, tuple[int, ...]]) -> list[bytes]:
+    """The bytes that must stand right before each member: its headers, and the padding of a member just before."""
+    headers = []
+    before = 0  # bytes of the member before, in whole blocks and in part
+    for name, gap, size in zip(place.members, place.gaps, place.sizes, strict=True):
+        header = array_header(place.key, name, shapes[name])
+        padding = padded(before) - before
+        headers.append(header if gap > padding + len(header) else bytes(padding) + header)
+        before = NPY_HEADER_BYTES + size
+    return headers
 
 
 def _pieces(
@@ -129,21 +142,19 @@ def _fill(reader: ShardReader, place: ClipPlace, pieces: Sequence[tuple[int, mem
 
 def _damage(
     place: ClipPlace,
-    shapes: Sequence[tuple[int, ...]],
+    wanted: Sequence[bytes],
     headers: Sequence[memoryview],
     slots: Sequence[memoryview],
     tails: Sequence[memoryview],
 ) -> str | None:
     """The first thing that is wrong with the bytes that were read, member by member."""
-    before = 0  # bytes of the member before, in whole blocks and in part
-    for name, header, shape, size in zip(READ_MEMBERS, headers, shapes, place.sizes, strict=True):
-        if header != bytes(padded(before) - before) + array_header(place.key, name, shape):
+    for name, header, right in zip(place.members, headers, wanted, strict=True):
+        if header != right:
             return wrong_header(f"{name}.npy")
-        before = NPY_HEADER_BYTES + size
-    for name, wanted, slot, tail in zip(READ_MEMBERS, place.checksums, slots, tails, strict=True):
+    for name, checksum, slot, tail in zip(place.members, place.checksums, slots, tails, strict=True):
         found = _checksum(slot, tail)
-        if found != wanted:
-            return wrong_checksum(f"{name}.npy", f"{wanted:016x}", f"{found:016x}")
+        if found != checksum:
+            return wrong_checksum(f"{name}.npy", f"{checksum:016x}", f"{found:016x}")
     return None
 
 
@@ -155,10 +166,14 @@ def _checksum(slot: memoryview, tail: memoryview) -> int:
     return state.intdigest()
 
 
-def _require_sound(place: ClipPlace, sizes: tuple[int, ...]) -> None:
+def _require_sound(place: ClipPlace, sizes: Mapping[str, int]) -> None:
     """The index must give the members the sizes of a clip, one behind the other, with room for headers between them."""
-    gaps = place.gaps
-    if place.sizes != sizes or min(gaps) <= 0 or max(gaps) > MAX_GAP_BYTES:
+    gaps, passed_over = place.gaps, sum(sizes.values()) - sum(sizes[name] for name in place.members)
+    if (
+        place.sizes != tuple(sizes[name] for name in place.members)
+        or min(gaps) <= 0
+        or max(gaps) > MAX_GAP_BYTES + passed_over
+    ):
         raise IntegrityError(
             f"{place.where}: {INDEX_NAME} places members where a clip of {place.latents} latents does not have them, "
             f"at {place.offsets} with {place.sizes} bytes; restore the index"

@@ -14,7 +14,7 @@ from wsm_data.loaders.batches.filling import BatchSequence, batch_layout, descri
 from wsm_data.loaders.config import ReadConfig
 from wsm_data.loaders.order.epoch_order import EpochOrder
 from wsm_data.loaders.reading.clip_filler import ClipFiller
-from wsm_data.loaders.reading.clip_places import clip_places, span_of
+from wsm_data.loaders.reading.clip_places import READ_MEMBERS, RGB_MEMBERS, clip_places, span_of
 from wsm_data.loaders.sources.clips import Sources
 from wsm_data.loaders.timing import Part, Timing
 
@@ -24,7 +24,9 @@ Delivered = TypeVar("Delivered")
 class StepReader:
     """Reads steps of one rank. Safe to be used by several threads; what it delivers does not depend on them."""
 
-    def __init__(self, sources: Sources, read: ReadConfig, timing: Timing, *, rank: int, world_size: int):
+    def __init__(
+        self, sources: Sources, read: ReadConfig, timing: Timing, *, rank: int, world_size: int, depth: bool = True
+    ):
         """Open the shards.
 
         Args:
@@ -33,6 +35,7 @@ class StepReader:
             timing: adds up the time of all parts.
             rank: number of this rank.
             world_size: number of ranks.
+            depth: whether batches have depth.
 
         Raises:
             ConfigError: a dtype that latents cannot have, no statistics to standardise by, a place without a reader.
@@ -40,7 +43,8 @@ class StepReader:
         self._sources, self._timing, self._rank, self._world_size = sources, timing, rank, world_size
         self._pool = BufferPool(blocks=max(read.prefetch_batches, 1) + 1, allocate=allocator(pinned=read.pin_memory))
         self.readers = _open_readers(sources, read)
-        self._filler = ClipFiller(sources, read, self.readers, timing)
+        self._filler = ClipFiller(sources, read, self.readers, timing, depth=depth)
+        self._depth, self._members = depth, READ_MEMBERS if depth else RGB_MEMBERS
 
     @property
     def asks_stores(self) -> bool:
@@ -52,7 +56,7 @@ class StepReader:
         if not self.asks_stores:
             return
         spans: dict[ShardReader, list[Span]] = {}
-        for place in clip_places(self._sources, np.concatenate(self._rows(epoch_order, step))):
+        for place in clip_places(self._sources, np.concatenate(self._rows(epoch_order, step)), self._members):
             spans.setdefault(self.readers[place.source], []).append(span_of(place))
         for reader, coming in spans.items():
             reader.expect(coming)
@@ -70,8 +74,9 @@ class StepReader:
         with self._timing.measure(Part.COLLATE):
             rows = self._rows(epoch_order, step)
             refs = np.concatenate(rows)
-            clips = sequences_of_rows(rows, clip_places(self._sources, refs), epoch_order)
-            layout = batch_layout(clips, len(rows), epoch_order, self._filler.latent_shape, self._filler.dtype)
+            clips = sequences_of_rows(rows, clip_places(self._sources, refs, self._members), epoch_order)
+            shape, dtype = self._filler.latent_shape, self._filler.dtype
+            layout = batch_layout(clips, len(rows), epoch_order, shape, dtype, depth=self._depth)
             block = BatchBlock(
                 memory=self._pool.take(layout.size_bytes),
                 layout=layout,

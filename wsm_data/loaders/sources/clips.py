@@ -20,6 +20,7 @@ from wsm_data.loaders.order.epoch_order import EpochOrder, order_epoch
 from wsm_data.loaders.order.pass_order import SourceLayout
 from wsm_data.schema.arrays import Int64Array
 from wsm_data.shards.index_row import IndexRow
+from wsm_data.shards.names import TRAIN_SPLIT
 from wsm_data.shards.selection import read_selection
 
 
@@ -186,6 +187,27 @@ def open_sources(configs: Sequence[SourceConfig]) -> Sources:
         tables.append(_open_source(config, releases[config.release], base))
         _require_alike(tables[0].release, tables[-1].release)
     return Sources(tuple(tables))
+
+
+def require_depth(sources: Sources) -> None:
+    """Check that every clip has depth; the index is only asked where the release's statistics do not say so.
+
+    Raises:
+        ConfigError: a clip has none; says how many, and which is the first.
+    """
+    for table in sources.tables:
+        manifest = table.release.manifest
+        all_trained = manifest.rgb_statistics.count == manifest.depth_statistics.count > 0
+        if all_trained and table.config.split == TRAIN_SPLIT:
+            continue
+        without = np.flatnonzero(table.release.index.numbers("depth_latent_size")[table.rows] == 0)
+        if len(without):
+            [first] = table.keys(without[:1])
+            raise ConfigError(
+                f"every clip of {table.config.release} must have depth to train on it, found {len(without)} of "
+                f"{len(table)} without, the first is {first}; their source has none: set depth = false, train the "
+                "variant `idm`, or select clips with depth"
+            )
 
 
 def _open_source(config: SourceConfig, release: Release, base: int) -> SourceTable:

@@ -101,7 +101,7 @@ def _draw_header(figure: Figure, clip: Clip) -> None:
         f"camera {meta.id.camera}, {meta.camera_height_m:.2f} m high, {np.rad2deg(meta.camera_pitch_rad):.1f}° down",
         f"codec {meta.codec} {meta.codec_digest[:12]}",
         f"{moving_frames(clip)} frames + {meta.padded_frames} still = {clip.latent_count} latents",
-        f"depth measured {depth_valid_share(clip):.1%}",
+        "no depth" if (measured := depth_valid_share(clip)) is None else f"depth measured {measured:.1%}",
         f"map from {meta.map_from}, {meta.map_resolution_m * 100:g} cm cells",
     )
     _fitted_text(figure, 24, meta.key, fontsize=17, fontweight="bold")

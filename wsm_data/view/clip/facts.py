@@ -33,7 +33,7 @@ class ClipFacts:
         clearance_min_m: smallest such distance, m; None likewise.
         camera_height_m: height of the camera above the floor, m.
         camera_pitch_deg: pitch down from the horizontal, degrees.
-        depth_valid_share: share of depth pixels with a measurement.
+        depth_valid_share: share of depth pixels with a measurement; None where the clip has no depth.
         map_area_m2: area of the map crop, m^2.
         map_unknown_share: share of the crop's cells that are unknown.
         notes: reason codes of what was accepted but is worth knowing.
@@ -49,7 +49,7 @@ class ClipFacts:
     clearance_min_m: float | None
     camera_height_m: float
     camera_pitch_deg: float
-    depth_valid_share: float
+    depth_valid_share: float | None
     map_area_m2: float
     map_unknown_share: float
     notes: tuple[str, ...]
@@ -99,8 +99,10 @@ def clip_field_m(clip: Clip) -> Float64Array:
     return np.where(clip.geodesic_mm == UNREACHABLE_MM, np.nan, clip.geodesic_mm / 1000.0)
 
 
-def depth_valid_share(clip: Clip) -> float:
-    """Share of depth pixels with a measurement, over the latent frames that hold more than padding."""
+def depth_valid_share(clip: Clip) -> float | None:
+    """Share of depth pixels with a measurement, over the latents that hold more than padding; None without depth."""
+    if clip.depth_valid is None:
+        return None
     latents = real_latents(clip.frame_count, clip.meta.padded_frames)
     return float(clip.depth_valid[:latents].mean() / 255)
 

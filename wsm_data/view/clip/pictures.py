@@ -21,7 +21,7 @@ class DecodedFrames:
     Attributes:
         frames: which raw frames.
         rgb_u8: colour; uint8 [N, H, W, 3].
-        depth_m: depth along the optical axis, m; float32 [N, H, W].
+        depth_m: depth along the optical axis, m; float32 [N, H, W]; 0 where the clip has no depth.
         measured: false in the latent cells of which less than half was measured, whose depth means nothing;
             bool [N, H, W].
     """
@@ -46,7 +46,7 @@ class ClipPictures:
         rgb_u8: decoded colour; uint8 [N, H, W, 3].
         depth_u8: decoded depth in the colours of `depth_picture`, grey in the latent cells of which less than half was
             measured; uint8 [N, H, W, 3].
-        depth_valid_share: share of measured depth pixels in the latent frame of each; float64 [N].
+        depth_valid_share: share of measured depth pixels in the latent frame of each; float64 [N], 0 without depth.
     """
 
     frames: tuple[int, ...]
@@ -75,8 +75,10 @@ def decode_frames(clip: Clip, codec: VideoCodec, frames: Sequence[int]) -> Decod
     _require_same_codec(clip, codec)
     chosen = list(frames)
     rgb = codec.decode(clip.rgb_latent.astype(np.float32))[chosen]
-    depth_video = codec.decode(clip.depth_latent.astype(np.float32))[chosen]
-    depth_m = depth_m_from_latent_video(depth_video, clip.meta.depth_range)
+    depth_m = np.zeros(rgb.shape[:3], np.float32)
+    if clip.depth_latent is not None:
+        depth_video = codec.decode(clip.depth_latent.astype(np.float32))[chosen]
+        depth_m = depth_m_from_latent_video(depth_video, clip.meta.depth_range)
     return DecodedFrames(
         frames=tuple(chosen),
         rgb_u8=np.round((np.clip(rgb, -1.0, 1.0) + 1.0) * 127.5).astype(np.uint8),
@@ -101,7 +103,10 @@ def decode_pictures(clip: Clip, codec: VideoCodec, frames: Sequence[int]) -> Cli
 
 
 def _cells(clip: Clip, frames: Sequence[int]) -> Uint8Array:
+    """Share of measured pixels, 0..255, in each cell of the latent of each frame; 0 where the clip has no depth."""
     latents = [-(-frame // TEMPORAL_RATIO) for frame in frames]  # latent j >= 1 covers the raw frames 4j - 3 .. 4j
+    if clip.depth_valid is None:
+        return np.zeros((len(latents), *clip.rgb_latent.shape[2:]), np.uint8)
     return clip.depth_valid[latents]
 
 

@@ -53,11 +53,15 @@ def _facts(facts: ClipFacts) -> str:
         ("clearance, median", _number(facts.clearance_median_m, " m")),
         ("clearance, least", _number(facts.clearance_min_m, " m")),
         ("camera", f"{facts.camera_height_m:.3f} m high, pitched down {facts.camera_pitch_deg:.2f} degrees"),
-        ("depth measured", f"{facts.depth_valid_share:.2%} of pixels"),
+        ("depth measured", _share(facts.depth_valid_share)),
         ("map", f"{facts.map_area_m2:.1f} m2, {facts.map_unknown_share:.1%} unknown"),
         ("notes", ", ".join(facts.notes) or "none"),
     ]
     return aligned(rows)
+
+
+def _share(value: float | None) -> str:
+    return "the clip has no depth" if value is None else f"{value:.2%} of pixels"
 
 
 def _number(value: float | None, unit: str) -> str:

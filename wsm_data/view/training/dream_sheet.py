@@ -29,7 +29,7 @@ class DreamSheet:
         frames: numbers of the raw frames.
         true_rgb_u8: what the clip's latents decode to; uint8 [N, H, W, 3].
         dreamed_rgb_u8: what the dreamed latents decode to; uint8 [N, H, W, 3].
-        true_depth_m: of the clip's depth latents, m; float32 [N, H, W].
+        true_depth_m: of the clip's depth latents, m; float32 [N, H, W]. None, and no row, where it was not read.
         estimated_depth_m: of the estimated latents, m; float32 [N, H, W]. None, and no row, where none is estimated.
         depth_range: ends of the depth colours.
         true_path_m: camera centres in the first camera's frame, m; float64 [T, 3].
@@ -41,7 +41,7 @@ class DreamSheet:
     frames: tuple[int, ...]
     true_rgb_u8: Uint8Array
     dreamed_rgb_u8: Uint8Array
-    true_depth_m: Float32Array
+    true_depth_m: Float32Array | None
     estimated_depth_m: Float32Array | None
     depth_range: DepthRange
     true_path_m: Float64Array
@@ -52,9 +52,9 @@ class DreamSheet:
         shape = (len(self.frames), *self.true_rgb_u8.shape[1:3])
         for name in ("true_rgb_u8", "dreamed_rgb_u8"):
             require_array(name, getattr(self, name), np.uint8, (*shape, 3))
-        require_array("true_depth_m", self.true_depth_m, np.float32, shape)
-        if self.estimated_depth_m is not None:
-            require_array("estimated_depth_m", self.estimated_depth_m, np.float32, shape)
+        for name in ("true_depth_m", "estimated_depth_m"):
+            if getattr(self, name) is not None:
+                require_array(name, getattr(self, name), np.float32, shape)
 
 
 def draw_dream_sheet(sheet: DreamSheet, path: Path) -> None:
@@ -72,13 +72,10 @@ def dream_sheet_figure(sheet: DreamSheet) -> Figure:
     height_px = _TOP_PX + 4 * (row_px + _GAP_PX) + _PATH_PX
     figure = new_figure(width_px, height_px)
     figure.text(16 / width_px, 1 - 14 / height_px, sheet.title, va="top", fontsize=15, fontweight="bold")
-    rows = [
-        ("RGB, true", sheet.true_rgb_u8),
-        ("RGB, dreamed", sheet.dreamed_rgb_u8),
-        ("depth, true", depth_picture(sheet.true_depth_m, sheet.depth_range)),
-    ]
-    if sheet.estimated_depth_m is not None:
-        rows.append(("depth, estimated", depth_picture(sheet.estimated_depth_m, sheet.depth_range)))
+    rows = [("RGB, true", sheet.true_rgb_u8), ("RGB, dreamed", sheet.dreamed_rgb_u8)]
+    for name, depth_m in (("depth, true", sheet.true_depth_m), ("depth, estimated", sheet.estimated_depth_m)):
+        if depth_m is not None:
+            rows.append((name, depth_picture(depth_m, sheet.depth_range)))
     for row, (name, pictures) in enumerate(rows):
         top_px = _TOP_PX + row * (row_px + _GAP_PX)
         figure.text(16 / width_px, 1 - (top_px + row_px / 2) / height_px, name, va="center")
