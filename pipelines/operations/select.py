@@ -9,6 +9,7 @@ from pipelines.artifacts.release_files import warn_if_not_writable
 from pipelines.operations import materialise as copying
 from pipelines.operations.run_stage import run_built, stage_settings
 from pipelines.running.options import StageRequest
+from pipelines.running.upstream import done_outcomes, vouched_by_ledger
 from pipelines.stages import select, verify
 from wsm_data.access.release import open_release
 from wsm_data.shards.release_codec import codec_of
@@ -35,7 +36,7 @@ def run_select(release: str, request: StageRequest, *, report: bool, materialise
     folder = run_built(select.STAGE, settings, request.out or Path("select") / settings.name, request)
     if request.options.dry_run:
         return
-    path = folder / settings.file_name
+    path = vouched_by_ledger(folder, done_outcomes(folder)[select.UNIT], folder / settings.file_name)
     select.install_selection(path, settings)
     typer.echo(f"selection: {path}")
     if report:

@@ -32,7 +32,7 @@ from wsm_data.shards.selection import (
 )
 
 _LOG = logging.getLogger(__name__)
-_UNIT = "selection"
+UNIT = "selection"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,7 +66,7 @@ class SelectConfig(SelectionConfig):
 
 def _list_units(config: SelectConfig) -> Sequence[Unit]:
     digest = release_digest(read_manifest(open_store(config.release)))
-    return [Unit(id=_UNIT, inputs={"manifest": digest, "scores": _scores_digest(config.scores_location)})]
+    return [Unit(id=UNIT, inputs={"manifest": digest, "scores": _scores_digest(config.scores_location)})]
 
 
 def _process(batch: Sequence[Unit], config: SelectConfig, context: StageContext) -> Iterator[Outcome]:

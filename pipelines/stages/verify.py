@@ -7,8 +7,9 @@ from pathlib import Path
 from tqdm import tqdm
 
 from pipelines.running.stage import Outcome, Stage, StageContext, Unit
-from wsm_data.access.release import read_manifest
+from wsm_data.access.release import open_release, read_manifest
 from wsm_data.access.verify import verify_release
+from wsm_data.curation.attached import attached_names, check_attached
 from wsm_data.errors import IntegrityError
 from wsm_data.files.digest import digest_json, sha256_bytes
 from wsm_data.files.locations import is_url
@@ -32,40 +33,64 @@ class VerifyConfig:
 
 
 def require_sound(location: str, quiet: bool = False) -> int:
-    """Read every byte of a release; returns the number of clips.
+    """Read every byte of a release, its scores and selections; returns the number of clips.
 
     Raises:
         IntegrityError: lists what is damaged, by shard and clip.
     """
+    clips = _require_sound_shards(location, quiet)
+    _require_sound_attached(location, attached_names(open_store(location)))
+    return clips
+
+
+def _require_sound_shards(location: str, quiet: bool) -> int:
     manifest = read_manifest(open_store(location))
     total = sum(shard.bytes for shard in manifest.shards)
     with tqdm(total=total, unit="B", unit_scale=True, desc="verify", disable=quiet, dynamic_ncols=True) as bar:
-        findings = verify_release(location, bar.update)
-    if findings:
-        raise IntegrityError(_message(location, findings))
+        _require_none(location, verify_release(location, bar.update))
     return manifest.clips
 
 
+def _require_sound_attached(location: str, names: Sequence[str]) -> None:
+    if names:
+        release = open_release(location)
+        _require_none(location, [found for name in names for found in check_attached(release, name)])
+
+
 def _list_units(config: VerifyConfig) -> Sequence[Unit]:
+    """The release, and each file about it: another selection is no reason to read the shards again."""
     store = open_store(config.release)
     manifest = read_manifest(store)
     inputs = {"manifest": sha256_bytes(store.read(MANIFEST_NAME))}
+    attached = [
+        Unit(id=name, inputs={**inputs, "content": sha256_bytes(store.read(name))}, payload=name)
+        for name in attached_names(store)
+    ]
     if not is_url(config.release):  # a local file that is touched is read again; a remote one is known by its size
         files = sorted(path for path in Path(config.release).iterdir() if _is_read(path.name))
         inputs["files"] = digest_json([[one.name, one.stat().st_size, one.stat().st_mtime_ns] for one in files])
-    return [Unit(id=manifest.name, inputs=inputs)]
+    return [Unit(id=manifest.name, inputs=inputs), *attached]
 
 
 def _is_read(name: str) -> bool:
-    """Whether a file of a release folder is looked at: scores and selections are about a release, not of it."""
+    """Whether a file belongs to a release; scores and selections are about it, and each is a unit of its own."""
     return name.endswith(".tar") or name in (MANIFEST_NAME, INDEX_NAME, INVENTORY_NAME, QUARANTINE_NAME)
 
 
 def _process(batch: Sequence[Unit], config: VerifyConfig, context: StageContext) -> Iterator[Outcome]:
     del context
     for unit in batch:
-        clips = require_sound(config.release, quiet=True)
-        yield Outcome(unit=unit.id, digest=unit.inputs["manifest"], facts={"clips": clips, "findings": 0})
+        if unit.payload:
+            _require_sound_attached(config.release, [unit.payload])
+            yield Outcome(unit=unit.id, digest=unit.inputs["content"], facts={"findings": 0})
+        else:
+            clips = _require_sound_shards(config.release, quiet=True)
+            yield Outcome(unit=unit.id, digest=unit.inputs["manifest"], facts={"clips": clips, "findings": 0})
+
+
+def _require_none(location: str, findings: Sequence[Finding]) -> None:
+    if findings:
+        raise IntegrityError(_message(location, findings))
 
 
 def _message(location: str, findings: Sequence[Finding]) -> str:

@@ -23,11 +23,12 @@ from numpy.typing import NDArray
 from wsm_data.curation.path_outline import PATH_POINTS, Outlines
 from wsm_data.errors import ConfigError
 from wsm_data.files.json_values import from_json, to_json
+from wsm_data.files.sealed import sealed, unsealed
 from wsm_data.files.tables import opened_table, read_statement, require_columns, with_statement, write_table
 from wsm_data.files.typed_toml import did_you_mean
 from wsm_data.schema.arrays import Float32Array, Float64Array, require_array, require_finite
 
-SCORES_VERSION = 2
+SCORES_VERSION = 3
 KEY_COLUMN, PATH_COLUMN, FLOOR_COLUMN = "key", "path_xy_m", "floor_z_m"
 
 _STATEMENT = "wsm.scores"
@@ -164,6 +165,17 @@ def read_scores(
     return table
 
 
+def stated_release(location: str | Path) -> str:
+    """Digest of the release that a file of scores says it belongs to; no column is read.
+
+    Raises:
+        ConfigError: there is no such file.
+        IntegrityError: it is damaged, or no table of scores of this version.
+    """
+    with _open(str(location)) as file:
+        return _parse_metadata(file.schema_arrow)[0]
+
+
 def read_scorers(location: str | Path) -> tuple[ScorerInfo, ...]:
     """What the scores of a file say of themselves, in the order of their columns; no column is read.
 
@@ -222,7 +234,8 @@ def require_sound_values(table: ScoreTable, where: str) -> None:
 
 
 def _schema(release_digest: str, scorers: Sequence[ScorerInfo]) -> pa.Schema:
-    statement = {"version": SCORES_VERSION, "release_digest": release_digest, "scorers": to_json(scorers)}
+    stated = {"version": SCORES_VERSION, "release_digest": release_digest, "scorers": to_json(scorers)}
+    statement = sealed(stated)  # parquet has checksums for its pages alone
     columns = [(KEY_COLUMN, pa.string()), (PATH_COLUMN, pa.binary(_PATH_BYTES)), (FLOOR_COLUMN, pa.float32())]
     columns += [(one.name, pa.float64()) for one in scorers]
     return with_statement(pa.schema(columns), _STATEMENT, statement)
@@ -264,7 +277,7 @@ def _open(where: str) -> Iterator[pq.ParquetFile]:
 
 
 def _parse_metadata(schema: pa.Schema) -> tuple[str, tuple[ScorerInfo, ...]]:
-    statement = read_statement(schema, _STATEMENT, SCORES_VERSION)
+    statement = unsealed(read_statement(schema, _STATEMENT, SCORES_VERSION))
     scorers = tuple(from_json(ScorerInfo, one) for one in statement["scorers"])
     require_columns(schema, _schema(statement["release_digest"], scorers))
     return str(statement["release_digest"]), scorers

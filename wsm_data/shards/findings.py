@@ -9,6 +9,7 @@ class FindingKind(StrEnum):
 
     RELEASE_UNREADABLE = "release.unreadable"  # unfinished, another schema version, or a damaged manifest
     FILE_CHANGED = "file.changed"  # index, inventory or quarantine: missing, or not what the manifest vouches for
+    ATTACHED_CHANGED = "attached.changed"  # scores or a selection: damaged, or not of the clips of this release
     COUNT = "release.count"  # a number in the manifest is not what the files hold
 
     SHARD_MISSING = "shard.missing"

@@ -15,7 +15,6 @@ from pipelines.stages import score as stage_module
 from pipelines.stages.score import ScoreConfig
 from pipelines.stages.verify import VerifyConfig
 from wsm_data.access.release import open_release
-from wsm_data.access.verify import verify_release
 from wsm_data.codecs.dct import DctCodec
 from wsm_data.curation.rollouts import ROLLOUT_SCORES, rollout_schema
 from wsm_data.curation.score_clip import CLIP_SCORES, score_clip
@@ -161,17 +160,19 @@ def test_a_release_may_be_left_as_it_is(score, release):
     assert sorted(path.name for path in release.iterdir()) == before
 
 
-def test_a_release_with_scores_and_selections_is_whole_and_not_verified_again(score, release, tmp_path):
+def test_scores_and_selections_are_verified_alone_and_a_damaged_one_is_named(score, release, tmp_path):
     def verify():
         config = VerifyConfig(release=str(release))
         return run_stage(load_stage("verify"), config, tmp_path / "verify", RunOptions(quiet=True)).ran
 
     assert len(verify()) == 1
     score()
+    assert verify() == ("scores.parquet",)
+    assert verify() == ()
     (release / "selections").mkdir()
     (release / "selections" / "hard.parquet").write_bytes(b"")
-    assert verify_release(release) == []
-    assert verify() == ()
+    with pytest.raises(IntegrityError, match=r"attached\.changed: .*selections/hard\.parquet must be a selection"):
+        verify()
 
 
 def test_behind_a_url_the_same_bytes_are_written_and_nothing_is_installed(score, release, caplog):

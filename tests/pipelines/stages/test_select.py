@@ -1,3 +1,4 @@
+import json
 import shlex
 import shutil
 
@@ -19,6 +20,7 @@ from wsm_data.curation.exclusion import ExclusionConfig
 from wsm_data.curation.rollouts import rollout_schema
 from wsm_data.curation.rule import RuleConfig, RuleKind
 from wsm_data.errors import ConfigError
+from wsm_data.files.sealed import sealed, unsealed
 from wsm_data.files.typed_toml import build_config
 from wsm_data.shards.manifest import release_digest
 from wsm_data.shards.selection import parse_selection, read_selection
@@ -151,10 +153,9 @@ def test_a_second_run_has_nothing_to_do_and_new_scores_are_noticed(select, relea
 
 def test_scores_of_another_release_are_refused_with_what_differs(select, release, tmp_path):
     table = pq.read_table(release / "scores.parquet").slice(1)
-    other = table.schema.metadata[b"wsm.scores"].replace(
-        release_digest(open_release(release).manifest).encode(), b"0" * 64
-    )
-    pq.write_table(table.replace_schema_metadata({b"wsm.scores": other}), tmp_path / "other.parquet")
+    stated = unsealed(json.loads(table.schema.metadata[b"wsm.scores"])) | {"release_digest": "0" * 64}
+    other = table.replace_schema_metadata({b"wsm.scores": json.dumps(sealed(stated))})
+    pq.write_table(other, tmp_path / "other.parquet")
     with pytest.raises(
         ConfigError, match=r"(?s)of another release.*release digest: 0{64} -> .*clips: 4 -> 5.*added: 1"
     ):

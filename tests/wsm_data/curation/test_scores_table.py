@@ -18,6 +18,7 @@ from wsm_data.curation.scores_table import (
     write_scores,
 )
 from wsm_data.errors import ConfigError, IntegrityError
+from wsm_data.files.sealed import SEAL, sealed
 
 WIDTH = ScorerInfo(name="width_m", unit="m", direction=Direction.LOWER, summary="how wide")
 COST = ScorerInfo(
@@ -176,7 +177,7 @@ def test_damage_is_told_from_a_wrong_request(file, tmp_path):
             read_scores(file, release_digest="d1")
     other = tmp_path / "other.parquet"
     pq.write_table(pa.table({"key": ["a"]}), other)
-    with pytest.raises(IntegrityError, match="must say version 2, found None"):
+    with pytest.raises(IntegrityError, match="must say version 3, found None"):
         read_scores(other, release_digest="d1")
 
 
@@ -195,8 +196,13 @@ def test_columns_that_are_not_those_the_file_speaks_of_are_refused(file):
     with pytest.raises(IntegrityError, match="its columns must be"):
         read_scores(file, release_digest="d1")
     record = json.loads(stored.schema.metadata[b"wsm.scores"])
-    record["scorers"][0]["direction"] = "sideways"
+    record["scorers"][0]["direction"] = "lower is harder, they say"
     pq.write_table(stored.replace_schema_metadata({b"wsm.scores": json.dumps(record)}), file)
+    with pytest.raises(IntegrityError, match="it was changed since it was written"):
+        read_scores(file, release_digest="d1")
+    record["scorers"][0]["direction"] = "sideways"
+    resealed = sealed({name: value for name, value in record.items() if name != SEAL})
+    pq.write_table(stored.replace_schema_metadata({b"wsm.scores": json.dumps(resealed)}), file)
     with pytest.raises(IntegrityError, match="sideways"):
         read_scores(file, release_digest="d1")
 
