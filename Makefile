@@ -17,8 +17,9 @@ PYTEST_OPTIONS ?=
 demo: $(VENV)/.ready
 	$(BIN)/wsm demo --out $(DEMO_OUT)
 
+# Byte code is written even where a container forbids it: hundreds of processes import the same modules.
 test: $(VENV)/.ready-dev
-	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n $(PYTEST_WORKERS) --dist worksteal $(PYTEST_OPTIONS)
+	PYTHONDONTWRITEBYTECODE= OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n $(PYTEST_WORKERS) --dist worksteal $(PYTEST_OPTIONS)
 
 check: $(VENV)/.ready-dev
 	$(BIN)/ruff format --check .
