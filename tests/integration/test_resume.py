@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from pipelines.cli import app
+
 WSM = [sys.executable, "-c", "from pipelines.cli import app; app()"]
 
 RECIPE = """
@@ -105,30 +107,27 @@ KILL_POINTS = {
 """What real stages may leave behind; that a run may die at any step is shown with small stages in tests/faults."""
 
 
-def _start(source: Path, run: Path, recipe: Path, workers: int) -> subprocess.Popen[bytes]:
-    command = [
-        *WSM,
-        "run",
-        str(recipe),
-        "--set",
-        f"source={source}",
-        "--out",
-        str(run),
-        "--workers",
-        str(workers),
-        "-q",
-    ]
+def _words(source: Path, run: Path, workers: int) -> list[str]:
+    recipe = run.with_name("recipe.toml")
+    recipe.write_text(RECIPE)
+    return ["run", str(recipe), "--set", f"source={source}", "--out", str(run), "--workers", str(workers), "-q"]
+
+
+def _start(source: Path, run: Path, workers: int) -> subprocess.Popen[bytes]:
+    """A run in a group of processes of its own, which can be killed."""
+    command = [*WSM, *_words(source, run, workers)]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True)
+
+
+def _finish(source: Path, run: Path, workers: int) -> None:
+    app(_words(source, run, workers), standalone_mode=False)
 
 
 @pytest.fixture(scope="module")
 def undisturbed(make_source, file_digests, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("undisturbed")
-    (folder / "recipe.toml").write_text(RECIPE)
-    process = _start(make_source(), folder / "run", folder / "recipe.toml", workers=1)
-    _, errors = process.communicate(timeout=300)
-    assert process.returncode == 0, errors.decode()
-    return file_digests(folder / "run" / "pack" / "release")
+    run = tmp_path_factory.mktemp("undisturbed") / "run"
+    _finish(make_source(), run, workers=1)
+    return file_digests(run / "pack" / "release")
 
 
 def _kill_when(process: subprocess.Popen[bytes], run: Path, reached) -> bool:
@@ -147,13 +146,10 @@ def _kill_when(process: subprocess.Popen[bytes], run: Path, reached) -> bool:
 def test_a_run_that_was_killed_ends_in_the_bytes_of_an_undisturbed_one(
     point, undisturbed, make_source, file_digests, tmp_path
 ):
-    (tmp_path / "recipe.toml").write_text(RECIPE)
     run = tmp_path / "run"
-    killed = _kill_when(_start(make_source(), run, tmp_path / "recipe.toml", workers=1), run, KILL_POINTS[point])
+    killed = _kill_when(_start(make_source(), run, workers=1), run, KILL_POINTS[point])
     assert killed, "the run ended before it could be killed; the condition names nothing that exists"
-    process = _start(make_source(), run, tmp_path / "recipe.toml", workers=1)
-    _, errors = process.communicate(timeout=300)
-    assert process.returncode == 0, errors.decode()
+    _finish(make_source(), run, workers=1)
     assert file_digests(run / "pack" / "release") == undisturbed
     for stage in ("index", "encode", "pack"):
         units = ledger(run / stage)
@@ -161,12 +157,9 @@ def test_a_run_that_was_killed_ends_in_the_bytes_of_an_undisturbed_one(
 
 
 def test_a_run_killed_again_and_again_still_ends_in_the_same_bytes(undisturbed, make_source, file_digests, tmp_path):
-    (tmp_path / "recipe.toml").write_text(RECIPE)
     run = tmp_path / "run"
     for lines in (1, 2, 3):
-        process = _start(make_source(), run, tmp_path / "recipe.toml", workers=2)
+        process = _start(make_source(), run, workers=2)
         assert _kill_when(process, run, _has_lines("encode", lines)), f"nothing was killed at {lines} clips"
-    process = _start(make_source(), run, tmp_path / "recipe.toml", workers=2)
-    _, errors = process.communicate(timeout=300)
-    assert process.returncode == 0, errors.decode()
+    _finish(make_source(), run, workers=2)
     assert file_digests(run / "pack" / "release") == undisturbed

@@ -7,15 +7,30 @@ import sys
 import time
 
 import pytest
+from fake_runs import environment
+
+
+@pytest.fixture(scope="module")
+def server():
+    """Starts `wsm` with the fake stages in processes of their own, without importing it for each anew."""
+    command = [sys.executable, "-m", "fake_wsm", "--serve"]
+    with subprocess.Popen(
+        command, env=environment(), stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as process:
+        yield process
+        process.stdin.close()
 
 
 @pytest.fixture
-def wsm(tmp_path, source, fakes_on_path):
-    """Runs `wsm` with the fake stages, in a process of its own."""
+def wsm(tmp_path, source, server):
+    """Runs `wsm` with the fake stages."""
 
     def run(*words):
-        command = [sys.executable, "-m", "fake_wsm", *map(str, words)]
-        return subprocess.run(command, env=fakes_on_path, cwd=tmp_path, capture_output=True, text=True, timeout=120)
+        server.stdin.write(json.dumps([str(tmp_path), *map(str, words)]) + "\n")
+        server.stdin.flush()
+        code = int(server.stdout.readline())
+        said = ((tmp_path / name).read_text() for name in ("stdout", "stderr"))
+        return subprocess.CompletedProcess(words, code, *said)
 
     return run
 
@@ -93,7 +108,7 @@ def test_ctrl_c_is_a_message_and_exit_code_130_and_the_run_goes_on_later(wsm, tm
             assert child.poll() is None
             time.sleep(0.02)
         child.send_signal(signal.SIGINT)
-        _, said = child.communicate(timeout=60)
+        _, said = child.communicate(timeout=300)
     assert child.returncode == 130
     assert said == "error: interrupted; run the same command again to go on where it stopped\n"
     done = wsm(*words)

@@ -52,6 +52,11 @@ def calls(tmp_path):
 @pytest.fixture
 def fakes_on_path():
     """Environment of a subprocess that can import the fake stages."""
+    return environment()
+
+
+def environment():
+    """Environment of a subprocess that can import the fake stages."""
     path = [str(FAKES), os.environ.get("PYTHONPATH", "")]
     return {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, path))}
 

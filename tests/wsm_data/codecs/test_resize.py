@@ -45,7 +45,7 @@ def shares(before, after):
 def test_colour_is_the_mean_over_the_area_of_each_target_pixel_to_the_last_bits(source, target):
     image = np.random.default_rng(sum(source)).integers(0, 256, (*source, 3)).astype(np.uint8)
     rows, columns = shares(source[0], target[0]), shares(source[1], target[1])
-    exact = np.einsum("yr,rcs,xc->yxs", rows, image.astype(object), columns)
+    exact = np.einsum("yr,rcs,xc->yxs", rows, image.astype(object), columns, optimize=True)
     wanted = (exact / Fraction(255, 2) - 1).astype(np.float64)
     # One subtraction and one division, each rounded to float32, of numbers that are exact below 2^24.
     np.testing.assert_allclose(resized_colour(image, target[1], target[0]), wanted, rtol=0, atol=2**-23)

@@ -16,7 +16,7 @@ from wsm_data.loaders.loader import ClipLoader
 from wsm_data.loaders.queries import QueryLoader
 from wsm_data.loaders.sources.queries import QueryConfig
 
-pytestmark = pytest.mark.timeout(60)  # far below the time that the store below is given to answer
+pytestmark = pytest.mark.timeout(300)  # far below the time that the store below is given to answer
 FOREVER = 10**9
 PATIENT = {"request_timeout_s": 3600.0, "attempts": 1000}
 BOTH = pytest.mark.parametrize("access", list(RemoteAccess))

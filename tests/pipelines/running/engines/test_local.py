@@ -64,7 +64,7 @@ def test_a_result_that_does_not_pickle_is_told_and_not_lost(tmp_path, fakes_on_p
     """In a program of its own: workers write to what was the standard error when their server was started."""
     program = tmp_path / "program.py"
     program.write_text(FAILING_PARENT)
-    done = subprocess.run([sys.executable, program], env=fakes_on_path, capture_output=True, text=True, timeout=120)
+    done = subprocess.run([sys.executable, program], env=fakes_on_path, capture_output=True, text=True, timeout=300)
     assert "Can't pickle local object" in done.stderr
     assert "WsmError: a worker process died (exit code 1;" in done.stderr
 
@@ -147,7 +147,7 @@ def test_ctrl_c_is_the_parents_and_ends_everything(parent):
     time.sleep(0.2)
     assert all(map(is_alive, workers))
     child.send_signal(signal.SIGINT)
-    _, said = child.communicate(timeout=60)
+    _, said = child.communicate(timeout=300)
     assert said.count(b"Traceback") == 1  # the parent's own; workers are silent
     assert said.rstrip().endswith(b"KeyboardInterrupt")
     assert not any(map(is_alive, workers))
