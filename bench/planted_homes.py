@@ -14,6 +14,7 @@ import numpy as np
 from scipy import ndimage
 
 from wsm_data.clips.config import ClipConfig
+from wsm_data.clips.path_on_floor import lay_path
 from wsm_data.clips.scene_view import view_scene
 from wsm_data.curation.scorers.trajectory import Trajectory, map_with
 from wsm_data.errors import DataError
@@ -319,7 +320,8 @@ def on_map(
     )
     config = ClipConfig()
     try:
-        view = view_scene(record, scene_map_of(floor, blocked, first), DATASET, config)
+        laid = lay_path(record, scene_map_of(floor, blocked, first), DATASET, config)
+        view = view_scene(record, laid, DATASET, config)
     except DataError:
         return None
     return Trajectory(

@@ -17,6 +17,7 @@ import pipelines.stages.index
 import pipelines.stages.map  # noqa: F401 - only to be loaded, as the three above
 from wsm_data.checks.depth_pairs import depth_pair, relative_errors
 from wsm_data.clips.config import ClipConfig
+from wsm_data.clips.path_on_floor import lay_path
 from wsm_data.clips.scene_view import view_scene
 from wsm_data.codecs.clip_video import depth_video, rgb_video
 from wsm_data.codecs.dct import DctCodec
@@ -57,7 +58,8 @@ def _use_map_kernels() -> None:
     voxels_from_depth([np.zeros((1, 3))])
     voxels = voxels_from_cloud(read_point_cloud(_cloud_file()), _DATASET.cloud)
     scene_map = build_scene_map(voxels, (0.0,), _DATASET.robot, max_height_m=1.0)
-    view_scene(_record(), scene_map, _DATASET, ClipConfig())
+    config = ClipConfig()
+    view_scene(_record(), lay_path(_record(), scene_map, _DATASET, config), _DATASET, config)
     near_surface(scene_map.levels[0], np.zeros((1, 3)))
 
 

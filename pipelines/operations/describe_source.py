@@ -8,20 +8,15 @@ from pathlib import Path
 
 import typer
 
+from pipelines.operations.soundness.source_manifest import fitting_manifests, layouts
 from wsm_data.checks.record import record_refusal
-from wsm_data.errors import ConfigError, DataError
+from wsm_data.errors import DataError
 from wsm_data.files.json_values import to_json
 from wsm_data.readers.manifest import load_dataset
-from wsm_data.readers.registry import READERS, source_reader
+from wsm_data.readers.registry import source_reader
 from wsm_data.readers.source import Container, ContainerScan
 from wsm_data.schema.dataset import DatasetManifest
 from wsm_data.schema.verdict import Refusal
-
-GUESSES = (
-    ("arrays", "tum_rgbd", "bonn_rgbd", "replica_sequences", "scannet_sequences", "icl_nuim"),
-    ("interndata_n1", "synthetic"),
-)
-"""Manifests that are tried; the last ones only where no other fits, for any two folders could be InternData's."""
 
 _DEPTH_SAMPLE_EVERY = 10
 
@@ -72,16 +67,13 @@ def describe_source(source: Path, dataset: str, limit: int) -> SourceDescription
 
     Args:
         source: its root.
-        dataset: the manifest to read it with; empty: the first that fits of `GUESSES`.
+        dataset: the manifest to read it with; empty: the first that fits of `source_manifest.GUESSES`.
         limit: how many containers are read at most; 0: all.
 
     Raises:
         ConfigError: as `show_source`.
     """
-    guesses = ([name for name in names if _fits(source, load_dataset(name))] for names in GUESSES)
-    fits = [dataset] if dataset else next(filter(None, guesses), [])
-    if not fits:
-        raise ConfigError(f"{source} must be a source, and none fits; what was looked for:\n{_looked_for()}")
+    fits = [dataset] if dataset else fitting_manifests(source)
     manifest = load_dataset(fits[0])
     containers = source_reader(manifest).find_containers(source, manifest)
     read = containers[:limit] if limit else containers
@@ -109,13 +101,6 @@ def describe_source(source: Path, dataset: str, limit: int) -> SourceDescription
     )
 
 
-def _fits(source: Path, dataset: DatasetManifest) -> bool:
-    try:
-        return bool(source_reader(dataset).find_containers(source, dataset))
-    except ConfigError:
-        return False
-
-
 def _scans(
     source: Path, containers: Sequence[Container], dataset: DatasetManifest
 ) -> tuple[list[ContainerScan], list[Refusal]]:
@@ -132,10 +117,6 @@ def _scans(
     return scans, refusals
 
 
-def _looked_for() -> str:
-    return "\n".join(f"  {reader.name}: {reader.expects}" for reader in READERS)
-
-
 def _lines(found: SourceDescription) -> list[str]:
     lines = [
         f"manifest: {found.dataset} (reader {found.reader})",
@@ -148,5 +129,5 @@ def _lines(found: SourceDescription) -> list[str]:
         *(f"  {one.unit}: {one.reason}: {one.message}" for one in found.refusals),
     ]
     if not found.trajectories:
-        lines += [f"nothing can be used; is it another layout? What was looked for:\n{_looked_for()}"]
+        lines += [f"nothing can be used; is it another layout? What was looked for:\n{layouts()}"]
     return lines

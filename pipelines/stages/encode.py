@@ -12,9 +12,11 @@ from pipelines.artifacts.layout import clips_folder, codec_path, map_path, recor
 from pipelines.artifacts.source import IndexedSource, conventions_digest, indexed_source
 from pipelines.running.stage import Finished, Outcome, Settled, Stage, StageContext, Unit, refused
 from pipelines.running.upstream import done_outcomes, quarantine_of, require_stage, vouched_by_ledger
+from wsm_data.checks.gate import require_kept
 from wsm_data.clips.build import ClipVideos, Provenance, build_clip, measure_quality, read_videos
 from wsm_data.clips.config import ClipConfig
-from wsm_data.clips.episode_gate import require_sound
+from wsm_data.clips.episode_gate import episode_verdicts
+from wsm_data.clips.path_on_floor import lay_path
 from wsm_data.clips.scene_view import SceneView, view_scene
 from wsm_data.codecs.base import VideoCodec
 from wsm_data.codecs.clip_video import VideoMemory
@@ -168,8 +170,9 @@ def _prepare(
     for record, frames in source.reader.iter_frames(source.root, scene.container, source.dataset, records):
         unit = units[record.id.text]
         try:
-            require_sound(record, frames, scene_map, source.dataset)
-            view = view_scene(record, scene_map, source.dataset, config.clip)
+            laid = lay_path(record, scene_map, source.dataset, config.clip)
+            require_kept(*episode_verdicts(record, frames, scene_map, laid, source.dataset).values())
+            view = view_scene(record, laid, source.dataset, config.clip)
             videos = read_videos(record, frames, source.dataset, config.clip, memory)
             yield _Prepared(unit=unit, record=record, view=view, videos=videos)
         except DataError as error:

@@ -28,12 +28,14 @@ def test_every_stage_is_in_the_tour():
     assert [entry.name for entry in STAGES if f"`wsm {entry.name}`" not in tour] == []
 
 
-@pytest.mark.parametrize("page", [*PAGES, "docs/loaders.md", "docs/closed_loop.md", "docs/sources.md"])
+@pytest.mark.parametrize(
+    "page", [*PAGES, "docs/loaders.md", "docs/closed_loop.md", "docs/sources.md", "docs/soundness.md"]
+)
 def test_every_option_in_the_documentation_exists(page):
     text = (ROOT / page).read_text()
     options = set(re.findall(r"(?<![\w-])--[a-z][a-z-]+", text))
     commands = ("run", "inspect", "verify", "select", "audit", "audit-run", "bench loader")
-    commands += ("train", "eval nav", "eval slam", "serve", "source describe")
+    commands += ("train", "eval nav", "eval slam", "serve", "source describe", "check", "preflight")
     helped = "".join(CliRunner().invoke(app, [*command.split(), "--help"]).output for command in commands)
     assert options - {one for one in options if one in helped} == set()
 

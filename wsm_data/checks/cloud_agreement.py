@@ -60,8 +60,9 @@ def check_cloud_agreement(bands: HeightBands, level: FloorLevel, where: str, min
         if len(points) >= MIN_POINTS
     }
     measured: dict[str, object] = {f"{name}_points_near_cloud": share for name, share in shares.items()}
+    limits = dict.fromkeys(measured, min_share)
     if all(share >= min_share for share in shares.values()):
-        return Verdict(measured=measured)
+        return Verdict(measured=measured, limits=limits)
     points_m = np.concatenate([bands.ground_m, bands.upright_m])
     fits = fitting_placement(level, points_m, bands.upright_m)
     found = " and ".join(f"{share:.0%} of the {name} points" for name, share in shares.items())
@@ -74,4 +75,5 @@ def check_cloud_agreement(bands: HeightBands, level: FloorLevel, where: str, min
         f"{where}: at least {min_share:.0%} of the points that depth images show must lie within a voxel of the "
         f"scene's cloud, found {found}; {advice}"
     )
-    return Verdict(reason=Reason.CLOUD_DISAGREES, message=message, measured={**measured, "fits": fits})
+    details = {**measured, "fits": fits}
+    return Verdict(reason=Reason.CLOUD_DISAGREES, message=message, measured=details, limits=limits)

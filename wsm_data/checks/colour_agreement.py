@@ -55,21 +55,23 @@ def check_colour_agreement(
             f"{spread[blank[0]]:.1f}; repair the source"
         )
         measured = {"frame": blank[0], "frames": len(blank), "min_spread": min(spread.values())}
-        return Verdict(reason=Reason.COLOUR_BLANK, message=message, measured=measured)
+        return Verdict(
+            reason=Reason.COLOUR_BLANK, message=message, measured=measured, limits={"min_spread": MIN_SPREAD}
+        )
     found = [_correlation(grey, depth_m, step, record) for step in steps]
     told = [value for value in found if value is not None]
     if not told:
         return Verdict(measured={"colour_steps": 0})
     median = float(np.median(told))
-    measured = {"colour_steps": len(told), "rank_correlation": median}
+    measured, limits = {"colour_steps": len(told), "rank_correlation": median}, {"rank_correlation": min_correlation}
     if median >= min_correlation:
-        return Verdict(measured=measured)
+        return Verdict(measured=measured, limits=limits)
     message = (
         f"{record.id.text}: the brightness of points that two frames see must correlate by {min_correlation:g} or more "
         f"in rank, found {median:.2f} (median of {len(told)} pairs of frames); are the colour images of this "
         "trajectory, in order, upright and not mirrored?"
     )
-    return Verdict(reason=Reason.COLOUR_DISAGREES, message=message, measured=measured)
+    return Verdict(reason=Reason.COLOUR_DISAGREES, message=message, measured=measured, limits=limits)
 
 
 def _correlation(

@@ -91,8 +91,9 @@ def check_depth_agreement(
         if mine > max_error and other <= min(max_error, mine / 2) and share > 0
     }
     measured: dict[str, object] = {"pairs": used, "median_relative_error": median}
+    limits = {"median_relative_error": max_error}
     if not better and (median is None or median <= max_error):
-        return Verdict(measured=measured)
+        return Verdict(measured=measured, limits=limits)
     fits = min(better, key=lambda name: better[name], default=None)
     advice = (
         f"they would agree if the poses were {fits}: correct the manifest's camera_axes, or the source"
@@ -110,7 +111,7 @@ def check_depth_agreement(
         if math.isfinite(other)
     }
     details = {**measured, "errors_where_they_differ": tried, "fits": fits}
-    return Verdict(reason=Reason.POSE_DEPTH_DISAGREE, message=message, measured=details)
+    return Verdict(reason=Reason.POSE_DEPTH_DISAGREE, message=message, measured=details, limits=limits)
 
 
 def _found(median: float | None, pairs: int, best: tuple[float, float, float] | None) -> str:

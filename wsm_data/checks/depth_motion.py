@@ -44,13 +44,14 @@ def check_depth_motion(
     told = {step: errors for step in steps if (errors := _errors(record, depth_m, step)) is not None}
     worst = max(told, key=lambda step: told[step][0], default=None)
     measured: dict[str, object] = {"steps": len(told)}
+    limits = {"worst_step_error": limit}
     if worst is None:
-        return Verdict(measured=measured)
+        return Verdict(measured=measured, limits=limits)
     own, still = told[worst]
     measured |= {"worst_step_error": own, "worst_step": list(worst), "error_without_motion": still}
     wrong = [step for step, (error, _) in told.items() if error > limit]
     if not wrong or (len(wrong) == 1 and own <= 2 * limit):
-        return Verdict(measured=measured)
+        return Verdict(measured=measured, limits=limits)
     moved_m = float(np.linalg.norm(np.diff(record.T_world_camera[list(worst), :3, 3], axis=0)))
     advice = (
         "without any motion they would agree: the poses move where the images stand still"
@@ -62,7 +63,8 @@ def check_depth_motion(
         f"poses put them, found {own:.0%} from frame {worst[0]} to {worst[1]}, between which the poses move "
         f"{moved_m:.2f} m, and {len(wrong)} of {len(told)} steps are wrong; {advice}"
     )
-    return Verdict(reason=Reason.POSE_MOTION_DISAGREE, message=message, measured={**measured, "wrong": len(wrong)})
+    details = {**measured, "wrong": len(wrong)}
+    return Verdict(reason=Reason.POSE_MOTION_DISAGREE, message=message, measured=details, limits=limits)
 
 
 def _errors(

@@ -18,10 +18,11 @@ def check_goal_reached(last_distance_m: float, goal_radius_m: float, where: str)
         where: what to call the trajectory in the message.
     """
     measured: dict[str, object] = {"last_distance_m": last_distance_m, "goal_radius_m": goal_radius_m}
+    limits = {"last_distance_m": ARRIVED_M}
     if last_distance_m <= ARRIVED_M:
-        return Verdict(measured=measured)
+        return Verdict(measured=measured, limits=limits)
     message = (
         f"{where}: the expert must end within {goal_radius_m:g} m of the stated goal, and ends {last_distance_m:.2f} m "
         "away from that region; state no goal to take the last position, or widen encode.clip.goal_radius_m"
     )
-    return Verdict(reason=Reason.GOAL_NOT_REACHED, message=message, measured=measured)
+    return Verdict(reason=Reason.GOAL_NOT_REACHED, message=message, measured=measured, limits=limits)

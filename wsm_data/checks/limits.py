@@ -15,11 +15,12 @@ def verdict_within(limits: Mapping[str, tuple[float, float, float]], reason: Rea
         what: beginning of the message, the record named: what does not hold then.
     """
     measured = {name: value for name, (value, _, _) in limits.items()}
+    allowed = {name: (low, high) for name, (_, low, high) in limits.items()}
     broken = [
         f"{name} must lie in [{low:g}, {high:g}], found {value:.4g}"
         for name, (value, low, high) in limits.items()
         if not low <= value <= high
     ]
     if not broken:
-        return Verdict(measured=measured)
-    return Verdict(reason=reason, message=f"{what}: {'; '.join(broken)}", measured=measured)
+        return Verdict(measured=measured, limits=allowed)
+    return Verdict(reason=reason, message=f"{what}: {'; '.join(broken)}", measured=measured, limits=allowed)

@@ -1,5 +1,7 @@
 """Does the camera stand on the robot as its mount says?"""
 
+from dataclasses import replace
+
 import numpy as np
 
 from wsm_data.checks.limits import verdict_within
@@ -28,7 +30,7 @@ def check_mount(record: EpisodeRecord, dataset: DatasetManifest) -> Verdict:
                 f"{verdict.message}; it would stand so if the poses were stored as {axes} and not as "
                 f"{dataset.camera_axes}: correct the manifest's camera_axes"
             )
-            return Verdict(reason=verdict.reason, message=message, measured={**verdict.measured, "fits": axes})
+            return replace(verdict, message=message, measured={**verdict.measured, "fits": axes})
     return verdict
 
 

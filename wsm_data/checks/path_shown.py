@@ -21,11 +21,13 @@ def check_path_shown(grid: OccupancyGrid, path_xy_m: Float64Array, where: str, m
     unknown = grid.cells[rows, columns] == UNKNOWN
     share = float(np.mean(unknown))
     measured: dict[str, object] = {"unknown_path_share": share}
+    limits = {"unknown_path_share": max_unknown_share}
     if share <= max_unknown_share:
-        return Verdict(measured=measured)
+        return Verdict(measured=measured, limits=limits)
     first = int(np.argmax(unknown))
     message = (
         f"{where}: at most {max_unknown_share:.0%} of the path may lead over floor that the cloud never showed, "
         f"found {share:.0%}, first at frame {first}; is it this scene's cloud, whole and in the same world?"
     )
-    return Verdict(reason=Reason.PATH_OFF_MAP, message=message, measured={**measured, "frame": first})
+    details = {**measured, "frame": first}
+    return Verdict(reason=Reason.PATH_OFF_MAP, message=message, measured=details, limits=limits)

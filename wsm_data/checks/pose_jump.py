@@ -28,16 +28,16 @@ def check_pose_jump(record: EpisodeRecord, limits: CheckLimits) -> Verdict:
     measured = {
         "max_step_m": float(step_m.max()),
         "median_step_m": float(np.median(step_m)),
-        "step_limit_m": step_limit_m,
         "max_turn_deg": float(turn_deg.max()),
-        "turn_limit_deg": turn_limit_deg,
     }
+    allowed = {"max_step_m": step_limit_m, "max_turn_deg": turn_limit_deg}
     jumps = np.flatnonzero((step_m > step_limit_m) | (turn_deg > turn_limit_deg))
     if len(jumps) == 0:
-        return Verdict(measured=measured)
+        return Verdict(measured=measured, limits=allowed)
     at = int(jumps[0])
     message = (
         f"{record.id.text}: between frames a camera may move {step_limit_m:.2f} m and turn {turn_limit_deg:.0f} "
         f"degrees, found {step_m[at]:.2f} m and {turn_deg[at]:.0f} degrees after frame {at} ({len(jumps)} jumps)"
     )
-    return Verdict(reason=Reason.POSE_JUMP, message=message, measured={**measured, "frame": at, "jumps": len(jumps)})
+    details = {**measured, "frame": at, "jumps": len(jumps)}
+    return Verdict(reason=Reason.POSE_JUMP, message=message, measured=details, limits=allowed)

@@ -8,8 +8,8 @@ import numpy as np
 from wsm_data.checks.cloud_agreement import check_cloud_agreement, height_bands
 from wsm_data.checks.colour_agreement import check_colour_agreement
 from wsm_data.checks.depth_motion import check_depth_motion
-from wsm_data.checks.gate import require_kept
 from wsm_data.clips.depth_gate import DepthSamples, check_samples, sample_depth
+from wsm_data.clips.path_on_floor import PathOnFloor
 from wsm_data.codecs.images import rgb_pixels
 from wsm_data.geometry.camera import pixel_rays
 from wsm_data.geometry.transform import transform_points
@@ -30,19 +30,25 @@ FARTHEST_M = 4.0
 """Points farther away are not held against the cloud: there the noise of depth cameras nears a voxel."""
 
 
-def require_sound(record: EpisodeRecord, frames: EpisodeFrames, scene_map: SceneMap, dataset: DatasetManifest) -> None:
-    """Refuse a trajectory whose images contradict its poses or the cloud of its scene.
+def episode_verdicts(
+    record: EpisodeRecord, frames: EpisodeFrames, scene_map: SceneMap, laid: PathOnFloor, dataset: DatasetManifest
+) -> dict[str, Verdict]:
+    """What every check that looks at images or at the map says, by its name, causes before their consequences.
+
+    Poses that are another's explain all else; where a cloud is another's no path leads over its floor; and what a
+    camera shows that drives through furniture does not move as it should.
 
     Raises:
-        DataError: the first reason, with all others in the message; or a frame does not decode.
+        DataError: a frame does not decode.
     """
     samples = sample_depth(record, frames, dataset)
-    require_kept(
-        check_samples(record, samples, dataset),
-        check_depth_motion(record, samples.depth_m, samples.steps, dataset.checks.max_depth_error),
-        check_colour(record, frames, samples, dataset),
-        check_cloud(record, samples, scene_map, dataset),
-    )
+    return {
+        "depth_agreement": check_samples(record, samples, dataset),
+        "cloud_agreement": check_cloud(record, samples, scene_map, dataset),
+        **laid.verdicts,
+        "depth_motion": check_depth_motion(record, samples.depth_m, samples.steps, dataset.checks.max_depth_error),
+        "colour_agreement": check_colour(record, frames, samples, dataset),
+    }
 
 
 def check_colour(

@@ -8,6 +8,7 @@ import struct
 
 from wsm_data.codecs.png_chunks import PNG_SIGNATURE
 from wsm_data.errors import DataError, Reason
+from wsm_data.readers.archive.tar_stream import POINTER_START
 
 _JPEG_START, _JPEG_END = b"\xff\xd8", b"\xff\xd9"
 _JPEG_FRAME_MARKERS = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}  # SOF0..15 less DHT, JPG and DAC
@@ -109,6 +110,12 @@ def require_pixels(size: tuple[int, int], max_pixels: int, where: str) -> None:
 def _require_start(data: memoryview, start: bytes, kind: str, where: str) -> None:
     if len(data) == 0:
         raise DataError(Reason.FRAME_EMPTY, f"{where}: an image must not be empty, found 0 bytes; download it again")
+    if data[: len(POINTER_START)] == POINTER_START:
+        raise DataError(
+            Reason.ARCHIVE_POINTER_FILE,
+            f"{where} must be a {kind}, but it is the text pointer that a clone without large-file support leaves; "
+            "fetch the file itself with `git lfs pull`",
+        )
     if data[: len(start)] != start[: len(data)]:
         found = bytes(data[: len(start)]).hex(" ")
         message = f"{where}: a {kind} starts with {start.hex(' ')}, found {found}; download it again"

@@ -58,6 +58,25 @@ class ContainerScan:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Preflight:
+    """Whether a container came over whole; nothing in it was decoded.
+
+    Attributes:
+        unit: id of the container.
+        walked: whether all of it was read; where not, only its first and last bytes were.
+        bytes_read: of its files.
+        trajectories: how many it seems to hold.
+        refusals: what is wrong with it.
+    """
+
+    unit: str
+    walked: bool
+    bytes_read: int = 0
+    trajectories: int = 0
+    refusals: tuple[Refusal, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
 class SourceReader:
     """A kind of source, as plain functions; each takes the source root and the conventions that apply to it.
 
@@ -70,6 +89,8 @@ class SourceReader:
             Raises `DataError` where the container as a whole cannot be used.
         iter_frames: gives the wanted episodes of a container, each once and as soon as it is complete, in one pass and
             in the order that costs least. Raises `IntegrityError` where the images are not those that were scanned.
+        preflight: says whether a container came over whole: all of it, or, where the last argument is false, as far as
+            its first and last bytes tell. None: `scan` reads little more than that, and does it.
     """
 
     name: str
@@ -79,3 +100,4 @@ class SourceReader:
     iter_frames: Callable[
         [Path, Container, DatasetManifest, Sequence[EpisodeRecord]], Iterator[tuple[EpisodeRecord, EpisodeFrames]]
     ]
+    preflight: Callable[[Path, Container, DatasetManifest, bool], Preflight] | None = None

@@ -11,20 +11,28 @@ from wsm_data.errors import DataError, Reason
 
 @dataclass(frozen=True, kw_only=True)
 class Verdict:
-    """The outcome of a quality gate: a value, never an exception. `measured` is kept as JSON values, as in `Refusal`.
+    """The outcome of a quality gate: a value, never an exception. Numbers are kept as JSON values, as in `Refusal`.
 
     Attributes:
         reason: None to keep the record, else why it is refused.
         message: what must hold, what was found, where, what to do.
         measured: the numbers behind the decision, with units in their names; reported for kept records too.
+        limits: what was allowed, by name: of a number in `measured`, or of the setting that it stands for.
     """
 
     reason: Reason | None = None
     message: str = ""
     measured: Mapping[str, object] = field(default_factory=dict)
+    limits: Mapping[str, object] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "measured", _json_value(self.measured))
+        for name in ("measured", "limits"):
+            object.__setattr__(self, name, _json_value(getattr(self, name)))
+
+    @classmethod
+    def from_error(cls, error: DataError) -> "Verdict":
+        """What a `DataError` says of the record that was worked on."""
+        return cls(reason=error.reason, message=error.message, measured=error.details)
 
     @property
     def keep(self) -> bool:

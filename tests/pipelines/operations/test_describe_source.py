@@ -7,7 +7,8 @@ import pytest
 from typer.testing import CliRunner
 
 from pipelines.cli import app
-from pipelines.operations.describe_source import GUESSES, describe_source
+from pipelines.operations.describe_source import describe_source
+from pipelines.operations.soundness.source_manifest import GUESSES
 from wsm_data.errors import ConfigError, Reason
 from wsm_data.readers.manifest import MANIFEST_FOLDER
 

@@ -6,8 +6,8 @@ from wsm_data.errors import Reason
 
 def test_a_sound_record_passes_every_check(make_record, dataset):
     verdicts = check_record(make_record(), dataset)
-    assert len(verdicts) == len(RECORD_CHECKS)
-    assert all(verdict.keep and verdict.measured for verdict in verdicts)
+    assert list(verdicts) == list(RECORD_CHECKS)
+    assert all(verdict.keep and verdict.measured and verdict.limits for verdict in verdicts.values())
 
 
 def test_all_faults_of_a_record_are_told_in_a_fixed_order(make_record, dataset):
@@ -16,7 +16,7 @@ def test_all_faults_of_a_record_are_told_in_a_fixed_order(make_record, dataset):
     poses[2:, 0, 3] += 5
     wide = dataclasses.replace(record.intrinsics, fx=500.0)
     record = dataclasses.replace(record, T_world_camera=poses, intrinsics=wide)
-    assert [verdict.reason for verdict in check_record(record, dataset)] == [
+    assert [verdict.reason for verdict in check_record(record, dataset).values()] == [
         Reason.EPISODE_TOO_SHORT,
         Reason.INTRINSICS_MISFIT,
         Reason.MOUNT_MISFIT,

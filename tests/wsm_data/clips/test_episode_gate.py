@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 from box_room import DATASET, HALL, along_x, cloud_points, frames_of, record_of
 
-from wsm_data.clips.episode_gate import require_sound
+from wsm_data.checks.gate import require_kept
+from wsm_data.clips.config import ClipConfig
+from wsm_data.clips.episode_gate import episode_verdicts
+from wsm_data.clips.path_on_floor import lay_path
 from wsm_data.errors import DataError, Reason
 from wsm_data.maps.scene_map import build_scene_map
 from wsm_data.maps.voxels import voxels_from_depth
@@ -19,6 +22,12 @@ FRAMES = frames_of(DRIVE)
 def scene(offset_m=(0.0, 0.0, 0.0), origin="cloud"):
     xyz = cloud_points([HALL])[0] + np.array(offset_m)
     return build_scene_map(replace(voxels_from_depth([xyz]), origin=origin), (0.0,), DATASET.robot, 2.0)
+
+
+def require_sound(record, frames, scene_map, dataset=DATASET):
+    loose = replace(dataset, checks=replace(dataset.checks, max_unknown_path_share=1.0, min_path_clearance_m=0.0))
+    laid = lay_path(record, scene_map, loose, ClipConfig())
+    require_kept(*episode_verdicts(record, frames, scene_map, laid, dataset).values())
 
 
 def refusal(record=None, frames=FRAMES, scene_map=None, dataset: DatasetManifest = DATASET):

@@ -7,6 +7,7 @@ import pytest
 from box_room import DATASET, HALL, UPSTAIRS, Drive, Room, along_x, cloud_points, moved, record_of
 
 from wsm_data.clips.config import ClipConfig
+from wsm_data.clips.path_on_floor import lay_path
 from wsm_data.clips.scene_view import view_scene
 from wsm_data.errors import DataError, Reason
 from wsm_data.maps.crop import crop_around, free_swept_cells
@@ -42,7 +43,8 @@ UNSEEN = replace(DATASET, checks=CheckLimits(max_unknown_path_share=1.0))
 
 
 def look(drive, scene, config=CONFIG, dataset=DATASET):
-    return view_scene(record_of(drive), scene, dataset, config)
+    record = record_of(drive)
+    return view_scene(record, lay_path(record, scene, dataset, config), dataset, config)
 
 
 def refusal(drive, scene, config=CONFIG):
@@ -197,7 +199,7 @@ def test_how_near_a_path_may_come_to_obstacles_is_the_manifests():
     drive = along_x()
     strict = replace(DATASET, checks=CheckLimits(min_path_clearance_m=1.6))
     with pytest.raises(DataError, match=r"must keep 1\.60 m from obstacles"):
-        view_scene(record_of(drive), scene_map([HALL], [drive]), strict, CONFIG)
+        look(drive, scene_map([HALL], [drive]), dataset=strict)
 
 
 def test_a_path_through_an_obstacle_is_refused_with_the_nearest_frame_and_its_clearance():
@@ -205,8 +207,8 @@ def test_a_path_through_an_obstacle_is_refused_with_the_nearest_frame_and_its_cl
     error = refusal(drive, scene_map([HALL], [drive]))
     assert error.reason is Reason.PATH_THROUGH_OBSTACLE
     assert error.details["min_clearance_m"] == pytest.approx(0.05, abs=1e-9)
-    assert drive.xy_m[error.details["frame"], 0] == pytest.approx(1.85)
-    assert error.details["frames"] == 2  # at x = 1.85 and 2.1 m
+    assert drive.xy_m[error.details["frame"], 0] == pytest.approx(1.6)
+    assert error.details["frames"] == 3  # the ways from x = 1.6, 1.85 and 2.1 m lead past the pillar
 
 
 def test_a_goal_behind_a_gap_that_is_too_narrow_is_refused_with_the_frames_that_cannot_reach_it():

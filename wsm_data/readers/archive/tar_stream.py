@@ -17,7 +17,9 @@ _BUFFER_BYTES = 1 << 19
 _GZIP_MAGIC = b"\x1f\x8b"
 _ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
 _TAR_MAGIC = b"ustar"
-_POINTER = b"version https://git-lfs"
+POINTER_START = b"version https://git-lfs"
+"""How the text begins that stands for a file in a clone without large-file support."""
+
 _OTHER_ARCHIVES = {
     b"PK": "zip",
     b"BZh": "bzip2",
@@ -148,8 +150,8 @@ def open_tar(path: Path, where: str) -> Iterator[TarStream]:
             `file.not_regular`.
     """
     with open_file(path, where) as file:
-        head = file.read(len(_POINTER))
-        if head == _POINTER:
+        head = file.read(len(POINTER_START))
+        if head == POINTER_START:
             raise DataError(
                 Reason.ARCHIVE_POINTER_FILE,
                 f"{where} must be an archive, but it is the text pointer that a clone without large-file support "

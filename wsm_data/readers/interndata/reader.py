@@ -2,6 +2,7 @@
 
 from wsm_data.readers.interndata.containers import EXPECTS, find_containers
 from wsm_data.readers.interndata.frames import iter_episode_frames
+from wsm_data.readers.interndata.preflight import preflight_container
 from wsm_data.readers.interndata.scan import scan_container
 from wsm_data.readers.source import SourceReader
 
@@ -11,4 +12,5 @@ INTERNDATA = SourceReader(
     find_containers=find_containers,
     scan=scan_container,
     iter_frames=iter_episode_frames,
+    preflight=preflight_container,
 )
