@@ -12,7 +12,7 @@ from typer.core import TyperGroup
 
 from pipelines.commands import audit, audit_run, bench, evaluate, inspect, run, serve, source, stages, train
 from pipelines.commands.command import Command, CommandGroup
-from pipelines.commands.soundness import check, preflight
+from pipelines.commands.soundness import audit_latents, check, preflight
 from pipelines.running.interrupts import (
     INTERRUPTED_EXIT_CODE,
     TERMINATED_EXIT_CODE,
@@ -36,6 +36,7 @@ COMMANDS: tuple[Command | CommandGroup, ...] = (
     source.GROUP,
     preflight.COMMAND,
     check.COMMAND,
+    audit_latents.COMMAND,
     bench.GROUP,
 )
 """In the order of `wsm --help`."""

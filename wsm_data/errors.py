@@ -102,6 +102,14 @@ class Reason(StrEnum):
     GOAL_UNREACHABLE = "goal.unreachable"
     GOAL_NOT_REACHED = "goal.not_reached"  # the source states a goal, and the expert ends elsewhere
 
+    # latents of a release that are not those of its source today
+    LATENT_SOURCE_CHANGED = "latent.source_changed"
+    LATENT_START_CHANGED = "latent.start_changed"
+    LATENT_RESIZE_CHANGED = "latent.resize_changed"
+    LATENT_DTYPE_CHANGED = "latent.dtype_changed"
+    LATENT_CHANNELS_CHANGED = "latent.channels_changed"
+    LATENT_CODEC_CHANGED = "latent.codec_changed"
+
 
 class WsmError(Exception):
     """A foreseen failure. The message says what must hold, what was found, where, and what to do."""
