@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from types import MappingProxyType
 
 import cv2
@@ -81,18 +82,19 @@ def audit_latents(audited: AuditedClip) -> Verdict:
     config = _clip_config(audited)
     videos = read_videos(record, audited.frames, audited.dataset, config)
     limit = TOLERANCE[audited.codec.describe().dtype]
-    stored = {"rgb": audited.clip.rgb_latent, "depth": audited.clip.depth_latent}
-    errors = {kind: difference(latent, audited.codec.encode(getattr(videos, kind))) for kind, latent in stored.items()}
+    pairs = _pairs(audited.clip, videos)
+    errors = {kind: difference(stored, audited.codec.encode(video)) for kind, (stored, video) in pairs.items()}
     limits = {f"{kind}_difference": limit for kind in errors}
     measured: dict[str, object] = {f"{kind}_difference": error for kind, error in errors.items()}
     if max(errors.values()) <= limit:
         return Verdict(measured=measured, limits=limits)
-    reason, what, error = _explained(audited, videos, max(errors, key=lambda kind: errors[kind]))
+    worst = max(errors, key=lambda kind: errors[kind])
+    reason, what, left = _explained(audited, worst, *pairs[worst])
     found = ", ".join(f"{error:.2g} of {kind}" for kind, error in errors.items())
     message = (
         f"{meta.id.text}: latents must differ by {limit:.0e} at most from those of the source, found {found}; {what}"
     )
-    return Verdict(reason=reason, message=message, measured={**measured, "explained_to": error}, limits=limits)
+    return Verdict(reason=reason, message=message, measured={**measured, "explained_to": left}, limits=limits)
 
 
 def difference(stored: np.ndarray, fresh: Float32Array) -> float:
@@ -111,12 +113,18 @@ def _clip_config(audited: AuditedClip) -> ClipConfig:
     return ClipConfig(**size, depth_range=meta.depth_range, still_frames=still, goal_radius_m=meta.goal_radius_m)
 
 
-def _explained(audited: AuditedClip, videos: ClipVideos, kind: str) -> tuple[Reason, str, float]:
+def _pairs(clip: Clip, videos: ClipVideos) -> dict[str, tuple[np.ndarray, Float32Array]]:
+    """By kind, the latents of a clip and the video of its source; depth only where there is some."""
+    pairs: dict[str, tuple[np.ndarray, Float32Array]] = {"rgb": (clip.rgb_latent, videos.rgb)}
+    if clip.depth_latent is not None and videos.depth is not None:
+        pairs["depth"] = clip.depth_latent, videos.depth
+    return pairs
+
+
+def _explained(audited: AuditedClip, kind: str, stored: np.ndarray, video: Float32Array) -> tuple[Reason, str, float]:
     """The change that explains the latents of a kind best, in words, and the difference that it leaves."""
-    video: Float32Array = getattr(videos, kind)
-    stored = getattr(audited.clip, f"{kind}_latent")
     plain = difference(stored, audited.codec.encode(video))
-    changes = {**_starts(video), **(_resizes(audited, videos) if kind == "rgb" else {})}
+    changes = {**_starts(video), **(_resizes(audited, video) if kind == "rgb" else {})}
     errors = {name: difference(stored, audited.codec.encode(changed())) for name, changed in changes.items()}
     errors[(Reason.LATENT_DTYPE_CHANGED, "they were rounded to bfloat16")] = difference(
         stored, _bfloat16(audited.codec.encode(video))
@@ -146,26 +154,26 @@ def _starts(video: Float32Array) -> Mapping[Change, Callable[[], Float32Array]]:
 
     moved: dict[Change, Callable[[], Float32Array]] = {}
     for frames in range(1, min(MAX_SHIFT_FRAMES, len(video) - 1) + 1):
-        moved[Reason.LATENT_START_CHANGED, f"the clip starts {frames} frames later"] = lambda n=frames: later(n)
-        moved[Reason.LATENT_START_CHANGED, f"the clip starts {frames} frames earlier"] = lambda n=frames: earlier(n)
+        moved[Reason.LATENT_START_CHANGED, f"the clip starts {frames} frames later"] = partial(later, frames)
+        moved[Reason.LATENT_START_CHANGED, f"the clip starts {frames} frames earlier"] = partial(earlier, frames)
     return moved
 
 
-def _resizes(audited: AuditedClip, videos: ClipVideos) -> Mapping[Change, Callable[[], Float32Array]]:
+def _resizes(audited: AuditedClip, video: Float32Array) -> Mapping[Change, Callable[[], Float32Array]]:
     """Colour resized in other ways, and with red and blue exchanged."""
-    height, width = videos.rgb.shape[1:3]
+    height, width = video.shape[1:3]
 
     def resized(how: int) -> Float32Array:
         where = audited.record.id.text
         images = [cv2.resize(rgb_pixels(one, where), (width, height), interpolation=how) for one in audited.frames.rgb]
-        return pad_frames(np.stack(images).astype(np.float32) / np.float32(127.5) - 1, len(videos.rgb))
+        return pad_frames(np.stack(images).astype(np.float32) / np.float32(127.5) - 1, len(video))
 
     changes: dict[Change, Callable[[], Float32Array]] = {
-        (Reason.LATENT_RESIZE_CHANGED, f"colour was resized otherwise: {name}"): lambda how=how: resized(how)
+        (Reason.LATENT_RESIZE_CHANGED, f"colour was resized otherwise: {name}"): partial(resized, how)
         for name, how in _RESIZES.items()
     }
     exchanged = Reason.LATENT_CHANNELS_CHANGED, "red and blue are exchanged"
-    changes[exchanged] = lambda: np.ascontiguousarray(videos.rgb[..., ::-1])
+    changes[exchanged] = lambda: np.ascontiguousarray(video[..., ::-1])
     return changes
 
 
