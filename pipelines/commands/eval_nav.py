@@ -44,12 +44,12 @@ def nav(
     model: Annotated[Path | None, typer.Option("--model", help="Folder of the model of --planner agent.")] = None,
     codec_weights: Annotated[str, typer.Option("--codec-weights", help="Folder of the codec's weights, if any.")] = "",
     world: Annotated[
-        str, typer.Option("--world", help="homes, or a folder of SCENE/pointgoal_start_goal_pairs.npy for homes.")
+        str, typer.Option("--world", help="homes, miniworld, or a folder of SCENE/pointgoal_start_goal_pairs.npy.")
     ] = "homes",
     episodes: Annotated[int, typer.Option("--episodes", min=1, help="Episodes in all; more go on in --out.")] = 50,
     episodes_per_scene: Annotated[int, typer.Option("--episodes-per-scene", min=1, help="Episodes a scene.")] = 5,
     seed: Annotated[
-        int, typer.Option("--seed", min=0, help="Of homes and episodes; another than the training data's.")
+        int, typer.Option("--seed", min=0, help="Of scenes and episodes; another than the training data's.")
     ] = 1000,
     protocol: Annotated[NavProtocol, typer.Option("--protocol", help="Whose endings and success.")] = NavProtocol.PAPER,
     goal: Annotated[NavGoal, typer.Option("--goal", help="Given once, or by the true pose each time.")] = NavGoal.FIXED,

@@ -27,8 +27,8 @@ class NavConfig:
         planner: name of a built-in planner, `agent`, or the URL of a server of the public protocol.
         model: folder of the agent's model; None for other planners.
         codec_weights: folder of the weights of the model's codec, where it has any.
-        world: `homes`, or a folder with a file of episodes for each home.
-        seed: homes and episodes follow from it. Homes of other seeds than a model was trained on were never seen.
+        world: `homes`, `miniworld`, or a folder with a file of episodes for each scene of these.
+        seed: scenes and episodes follow from it. Homes of other seeds than a model was trained on were never seen.
         episodes_per_scene: episodes in each scene.
         sim: robot, protocol, latency.
         agent: settings of the agent; None for other planners.

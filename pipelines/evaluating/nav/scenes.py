@@ -1,18 +1,27 @@
 """Which scenes and episodes are evaluated, and how a scene is opened."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from pipelines.evaluating.nav.config import NavConfig, episode_files
 from wsm_data.errors import ConfigError
+from wsm_data.schema.camera import Intrinsics
+from wsm_data.schema.dataset import Robot
 from wsm_data.sim.config import SimConfig
 from wsm_data.sim.episodes import Episode, make_episodes, read_episodes
 from wsm_data.sim.homes import make_home_world
+from wsm_data.sim.miniworld.world import make_miniworld
 from wsm_data.sim.world import World
 
-_HOME = re.compile(r"home_([0-9]+)_([0-9]{4,})")
+_MAKERS: Mapping[str, Callable[[int, int, Robot, float, Intrinsics], World]] = {
+    "home": make_home_world,
+    "miniworld": make_miniworld,
+}
+"""Makes scene number n of a seed, by the first word of its name."""
+_WORLDS = {"homes": "home", "miniworld": "miniworld"}
+_NAME = re.compile(rf"({'|'.join(_MAKERS)})_([0-9]+)_([0-9]{{4,}})")
 _FREE_M = 0.1
 """Generated episodes start and end so far from obstacles, beyond the robot's radius, m."""
 
@@ -22,11 +31,13 @@ class Scene:
     """A scene that is to be opened.
 
     Attributes:
-        seed: of the home.
-        index: of the home.
+        kind: first word of its name: which world it is of.
+        seed: of the scene.
+        index: of the scene.
         episodes: file of its episodes; None where they are generated.
     """
 
+    kind: str
     seed: int
     index: int
     episodes: Path | None = None
@@ -34,19 +45,20 @@ class Scene:
     @property
     def name(self) -> str:
         """Name in tables."""
-        return f"home_{self.seed}_{self.index:04d}"
+        return f"{self.kind}_{self.seed}_{self.index:04d}"
 
 
 def list_scenes(config: NavConfig, episodes: int) -> list[tuple[Scene, tuple[int, ...]]]:
     """Scenes with the numbers of their episodes, so many episodes in all; more of them only add to the list.
 
     Raises:
-        ConfigError: there is no such world, its files are not of homes, or hold fewer episodes.
+        ConfigError: there is no such world, its files are not of its scenes, or hold fewer episodes.
     """
     per_scene = config.episodes_per_scene
     counts = [min(per_scene, episodes - start) for start in range(0, episodes, per_scene)]
-    if config.world == "homes":
-        scenes: Sequence[Scene] = [Scene(seed=config.seed, index=index) for index in range(len(counts))]
+    if config.world in _WORLDS:
+        kind = _WORLDS[config.world]
+        scenes: Sequence[Scene] = [Scene(kind=kind, seed=config.seed, index=index) for index in range(len(counts))]
     else:
         scenes = _scenes_of_folder(Path(config.world))
         counts = counts[: len(scenes)]
@@ -55,7 +67,8 @@ def list_scenes(config: NavConfig, episodes: int) -> list[tuple[Scene, tuple[int
 
 def open_world(scene: Scene, config: SimConfig) -> World:
     """The world of a scene."""
-    return make_home_world(scene.seed, scene.index, config.robot, config.camera_height_m, config.intrinsics)
+    make = _MAKERS[scene.kind]
+    return make(scene.seed, scene.index, config.robot, config.camera_height_m, config.intrinsics)
 
 
 def scene_episodes(scene: Scene, world: World, config: NavConfig) -> tuple[Episode, ...]:
@@ -75,15 +88,16 @@ def _scenes_of_folder(folder: Path) -> list[Scene]:
     files = episode_files(folder) if folder.is_dir() else []
     if not files:
         raise ConfigError(
-            f"--world must be homes, or a folder of SCENE/pointgoal_start_goal_pairs.npy files, found {str(folder)!r}"
+            f"--world must be {', '.join(_WORLDS)}, or a folder of SCENE/pointgoal_start_goal_pairs.npy files, found "
+            f"{str(folder)!r}"
         )
     found = []
     for path in files:
-        match = _HOME.fullmatch(path.parent.name)
+        match = _NAME.fullmatch(path.parent.name)
         if match is None:
             raise ConfigError(
-                f"{path}: its folder must be named home_SEED_INDEX, after a home that can be generated, found "
-                f"{path.parent.name!r}"
+                f"{path}: its folder must be named {' or '.join(_MAKERS)}_SEED_INDEX, after what can be generated, "
+                f"found {path.parent.name!r}"
             )
-        found.append(Scene(seed=int(match[1]), index=int(match[2]), episodes=path))
+        found.append(Scene(kind=match[1], seed=int(match[2]), index=int(match[3]), episodes=path))
     return found
