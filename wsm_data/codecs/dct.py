@@ -18,7 +18,7 @@ from wsm_data.codecs.base import EncoderState, require_latents, require_next_fra
 from wsm_data.codecs.dct_kernels import FRAMES, SIDE, cosine_basis, forward, inverse
 from wsm_data.files.digest import digest_json
 from wsm_data.schema.arrays import Float32Array, Int16Array
-from wsm_data.schema.codec import CodecInfo
+from wsm_data.schema.codec import WHITENING, CodecInfo
 
 CHANNELS = 48
 _ALGORITHM = 1  # raise when the same settings give other bits
@@ -27,6 +27,10 @@ _PLANE_WEIGHTS = (1, 2, 2)  # Y, Cb, Cr
 _HIGHEST_WEIGHTED_FREQUENCY = 6
 _SCALE = 0.125
 """Latent per orthonormal coefficient: the constant of a white block is 32, its latent 4. A power of two, so exact."""
+
+_WHITENING = 0.5
+"""Channels are frequencies, and the lowest holds most of the energy: evened out wholly, a mean over channels says
+no more of it than of the finest texture. One half was measured beside 0 and 1 (docs/learning.md)."""
 
 _RED, _BLUE = np.float32(0.299), np.float32(0.114)  # luma of ITU-R BT.601, full range, as in JPEG
 _RED_SPAN, _BLUE_SPAN = np.float32(1.402), np.float32(1.772)  # 2 (1 - luma share), so that Cb and Cr fill [-1, 1]
@@ -139,7 +143,7 @@ class DctCodec:
             channels=CHANNELS,
             temporal_ratio=FRAMES,
             spatial_ratio=SIDE,
-            settings=settings,
+            settings={**settings, WHITENING: _WHITENING},
         )
 
 

@@ -192,6 +192,7 @@ def test_it_describes_its_geometry_and_has_no_statistics_of_its_own():
     info = CODEC.describe()
     assert (info.name, info.channels, info.temporal_ratio, info.spatial_ratio) == ("dct", 48, 4, 16)
     assert info.latent_mean == info.latent_std == ()
+    assert info.whitening == 0.5
     assert info.digest == DctCodec().describe().digest
     assert info.settings["coefficients"] == coefficient_table().tolist()
 
