@@ -27,6 +27,13 @@ class Variant(StrEnum):
     IDM = "idm"
 
 
+class Prediction(StrEnum):
+    """What the RGB head says of noisy latents; the loss is that of the velocity in either."""
+
+    VELOCITY = "velocity"
+    CLEAN = "clean"
+
+
 @dataclass(frozen=True, kw_only=True)
 class ExpertConfig:
     """Widths of one expert.
@@ -71,6 +78,7 @@ class ModelConfig:
         clean_state_time: timestep that clean states are modulated with (paper silent).
         state_query_time: timestep that state queries are modulated with (paper silent).
         variant: the full model, or the ablation without SLAM.
+        prediction: `velocity` (the paper), or `clean`, from which it follows (`wsm_model.flow.velocity_of`).
     """
 
     generation: ExpertConfig
@@ -93,6 +101,7 @@ class ModelConfig:
     clean_state_time: float = 0.0
     state_query_time: float = 1000.0
     variant: Variant = Variant.SLAM
+    prediction: Prediction = Prediction.VELOCITY
 
     def __post_init__(self) -> None:
         if self.latent_height % self.patch or self.latent_width % self.patch:

@@ -12,6 +12,7 @@ from torch import Tensor
 
 from wsm_data.schema.sequence import FrameTable
 from wsm_model.config import Expert, ModelConfig
+from wsm_model.flow import velocity_of
 from wsm_model.inputs import ModelInputs, ModelOutputs
 from wsm_model.layers.pose import identity_poses
 from wsm_model.mot.attention import JointTokens, attend_densely
@@ -58,8 +59,9 @@ class WorldSlamModel(MixtureOfTransformers):
         context = self.goal_context(inputs.goal_camera0_m, table)
         attend = self._attend(inputs, table, context.device)
         done = self.run(streams, attend, context)
+        read = self.expert(Expert.GENERATION).read(done[Expert.GENERATION])
         return ModelOutputs(
-            velocity=self.expert(Expert.GENERATION).read(done[Expert.GENERATION]),
+            velocity=velocity_of(self.config.prediction, read, inputs.noisy_rgb, inputs.flow_time),
             depth=self.expert(Expert.DEPTH).read(done[Expert.DEPTH]) if Expert.DEPTH in done else None,
             poses=self.expert(Expert.POSE).read(done[Expert.POSE]),
         )

@@ -6,7 +6,7 @@ from types import MappingProxyType
 
 from wsm_data.errors import ConfigError
 from wsm_data.files.typed_toml import did_you_mean
-from wsm_model.config import ExpertConfig, ModelConfig, Variant
+from wsm_model.config import ExpertConfig, ModelConfig, Prediction, Variant
 
 PRESETS: Mapping[str, ModelConfig] = MappingProxyType(
     {
@@ -18,6 +18,7 @@ PRESETS: Mapping[str, ModelConfig] = MappingProxyType(
             heads=6,
             head_width=32,
             pose_hidden=128,
+            prediction=Prediction.CLEAN,
         ),
         "small": ModelConfig(
             generation=ExpertConfig(width=768, feed_forward_width=2048),

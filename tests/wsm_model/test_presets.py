@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from wsm_data.errors import ConfigError
-from wsm_model.config import ExpertConfig, ModelConfig, Variant
+from wsm_model.config import ExpertConfig, ModelConfig, Prediction, Variant
 from wsm_model.model import WorldSlamModel
 from wsm_model.presets import PRESETS, preset
 
@@ -41,3 +41,8 @@ def test_shapes_that_cannot_be_built_are_refused():
         ModelConfig(generation=expert, depth=expert, pose=expert, layers=1, heads=1, head_width=7)
     with pytest.raises(ValueError, match="even width"):
         ExpertConfig(width=7, feed_forward_width=8)
+
+
+def test_the_tiny_size_predicts_latents_and_those_of_the_paper_the_velocity():
+    found = {name: one.prediction for name, one in PRESETS.items()}
+    assert found == {"tiny": Prediction.CLEAN, "small": Prediction.VELOCITY, "wsm5b": Prediction.VELOCITY}

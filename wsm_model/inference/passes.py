@@ -16,6 +16,7 @@ from torch import Tensor
 from torch.nn.functional import scaled_dot_product_attention
 
 from wsm_model.config import Expert, Variant
+from wsm_model.flow import velocity_of
 from wsm_model.inference.cache import History, KeysValues, Side, by_head
 from wsm_model.layers.pose import identity_poses
 from wsm_model.model import FLOW_TIME_SCALE
@@ -126,7 +127,8 @@ def velocity(
     done = model.run(
         {Expert.GENERATION: stream}, lambda layer, tokens: _gather(tokens, layer, histories, reach), context
     )
-    return expert.read(done[Expert.GENERATION])
+    read = expert.read(done[Expert.GENERATION])
+    return velocity_of(model.config.prediction, read, noisy, torch.full(noisy.shape[:2], flow_time).to(noisy))
 
 
 def _run_clean(

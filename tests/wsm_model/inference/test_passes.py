@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 import torch
 
-from wsm_model.config import Variant
+from wsm_model.config import Prediction, Variant
 from wsm_model.inference.cache import History
 from wsm_model.inference.passes import States, clean_rgb, clean_states, query_states, velocity
 
@@ -26,15 +26,17 @@ def histories_of(model, inputs, latents: int) -> list[History]:
     return histories
 
 
+@pytest.mark.parametrize("prediction", Prediction)
 @pytest.mark.parametrize("variant", Variant)
 @pytest.mark.parametrize("chunk_size", [1, 2, 3, 4])
 def test_a_dream_and_its_states_equal_those_of_the_single_pass(
-    make_model, make_inputs, make_spans, chunk_size, variant
+    make_model, make_inputs, make_spans, chunk_size, variant, prediction
 ):
     """The dreamed latents are those that training shows as clean RGB; without SLAM their poses see the goal."""
     frames, first = 1 + 2 * chunk_size, 1 + chunk_size
     spans = make_spans([frames, frames], [chunk_size, chunk_size])
-    model, inputs = make_model(variant), make_inputs(spans, flow_time=torch.full((2, frames), 0.625))
+    model = make_model(variant, prediction=prediction)
+    inputs = make_inputs(spans, flow_time=torch.full((2, frames), 0.625))
     with torch.no_grad():
         wanted, histories = model(inputs), histories_of(model, inputs, first)
         context = model.goal(inputs.goal_camera0_m)[:, None, None].expand(-1, chunk_size, -1, -1)
