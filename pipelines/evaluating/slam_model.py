@@ -14,7 +14,7 @@ from wsm_data.loaders.batches.standardise import standardisations
 from wsm_data.schema.clip import Clip
 from wsm_data.shards.latent_standard import latent_standard
 from wsm_model.config import Variant
-from wsm_model.evaluation.held_out import estimate_states
+from wsm_model.evaluation.streaming import stream_clip
 from wsm_model.inference.session import SessionConfig
 from wsm_model.losses.pose import raw_frame_poses
 from wsm_model.model_file import load_model
@@ -37,8 +37,10 @@ def model_estimator(folder: Path, release: Release, codec: VideoCodec) -> Callab
 
     def estimate(clip: Clip) -> Reconstruction:
         stored = torch.from_numpy(clip.rgb_latent.astype(np.float32)).to(device)
-        depth, poses = estimate_states(model, standardise.whole(stored, torch.float32), SessionConfig())
-        latents = standard.raw_depth(depth.float().cpu().numpy())
-        return reconstruction(clip, codec, latents, raw_frame_poses(poses.float().cpu()).double().numpy(), None)
+        streamed = stream_clip(model, standardise.whole(stored, torch.float32), SessionConfig())
+        latents = standard.raw_depth(streamed.depth.float().cpu().numpy())
+        return reconstruction(
+            clip, codec, latents, raw_frame_poses(streamed.poses.float().cpu()).double().numpy(), None
+        )
 
     return estimate

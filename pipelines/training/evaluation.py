@@ -3,68 +3,117 @@
 import dataclasses
 import json
 import logging
+from collections.abc import Mapping
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 from tqdm import tqdm
 
 from pipelines.training.config import HeldOutConfig
 from wsm_data.files.atomic import write_text
-from wsm_data.loaders.batches.batch import Batch
 from wsm_data.loaders.loader import ClipLoader
 from wsm_data.view.drawing.text_table import aligned
-from wsm_model.config import Variant
-from wsm_model.evaluation.held_out import ClipErrors, FlowErrors, clip_errors, flow_matching_errors, mean_of
+from wsm_model.evaluation.baselines import fit_baselines
+from wsm_model.evaluation.decoding import Decoding
+from wsm_model.evaluation.flow import FlowErrors, flow_matching_errors
+from wsm_model.evaluation.held_out import ClipErrors, HeldOutSettings, clip_errors
+from wsm_model.evaluation.summary import summarise
+from wsm_model.inference.sampler import flow_schedule
 from wsm_model.model import WorldSlamModel
 
 _LOG = logging.getLogger(__name__)
 
 
 def evaluate(
-    model: WorldSlamModel, loader: ClipLoader, config: HeldOutConfig, path: Path, *, shift: float, quiet: bool
+    model: WorldSlamModel,
+    loader: ClipLoader,
+    config: HeldOutConfig,
+    path: Path,
+    *,
+    decoding: Decoding,
+    shift: float,
+    quiet: bool,
 ) -> str:
     """Measure a model on held-out clips, write the numbers to `path`, and return a table of their means.
 
-    Without SLAM a model estimates no state of what it sees: there is the flow-matching loss alone.
+    Without SLAM a model estimates no state of what it sees: there are its dreams and the flow-matching loss alone.
 
     Args:
         model: in evaluation mode.
         loader: of held-out clips, one by one.
         config: how many, and how states are estimated.
-        path: JSON file to write.
+        path: JSON file to write: means by name, then each clip, and the flow-matching losses.
+        decoding: of the release.
         shift: gamma of the flow time.
         quiet: no progress bar.
     """
     clips = min(config.clips, loader.steps)
     if clips < config.clips:
         _LOG.warning("%d held-out clips were asked for, the split %s has %d", config.clips, config.split, clips)
-    estimates = model.config.variant is Variant.SLAM
-    batches: list[Batch] = []
+    batches = list(islice(loader, clips))
+    settings = HeldOutSettings(
+        session=config.session,
+        schedule=flow_schedule(config.flow_steps, shift),
+        decoding=decoding,
+        baselines=fit_baselines(batches, decoding, config.session.chunk_size),
+    )
     errors: list[ClipErrors] = []
-    for batch in tqdm(islice(loader, clips), total=clips, unit="clip", desc="evaluate", disable=quiet):
-        batches.append(batch)
-        errors += clip_errors(model, batch, config.session) if estimates else []
-    flow = flow_matching_errors(model, batches, seed=0, shift=shift)
-    record = {"clips": [dataclasses.asdict(one) for one in errors], "flow": dataclasses.asdict(flow)}
+    for batch in tqdm(batches, unit="clip", desc="evaluate", disable=quiet):
+        errors += clip_errors(model, batch, settings)
+    means, flow = summarise(errors), flow_matching_errors(model, batches, seed=0, shift=shift)
+    record = {**means, "flow": dataclasses.asdict(flow), "clips": [dataclasses.asdict(one) for one in errors]}
     write_text(path, json.dumps(record, indent=1) + "\n")
-    return evaluation_table(errors, flow, len(batches))
+    return evaluation_table(means, flow, len(batches))
 
 
-def evaluation_table(errors: list[ClipErrors], flow: FlowErrors, clips: int) -> str:
-    """Means over the clips beside those of what knows nothing; no states where there are no errors of any."""
-    rows = [["flow matching", f"{flow.model:.3f}", f"copy {flow.copy:.3f}, unconditional {flow.unconditional:.3f}"]]
-    if errors:
-        rows = [*_state_rows(errors), *rows]
+def evaluation_table(means: Mapping[str, Any], flow: FlowErrors, clips: int) -> str:
+    """Means over the clips beside those of what knows nothing; no row of what no clip has."""
+    rows = [
+        *(_state_rows(means) if "depth_mse" in means else []),
+        *(_dream_rows(means) if "dream_psnr_db" in means else []),
+        ["flow matching", f"{flow.model:.3f}", f"copy {flow.copy:.3f}, unconditional {flow.unconditional:.3f}"],
+    ]
     return aligned([[f"mean over {clips} held-out clips", "model", "beside it"], *rows])
 
 
-def _state_rows(errors: list[ClipErrors]) -> list[list[str]]:
-    ate, still, steady = (
-        mean_of(errors, name)
-        for name in ("ate_rmse_unaligned_m", "ate_rmse_zero_motion_m", "ate_rmse_constant_velocity_m")
-    )
-    depth, mean_depth = mean_of(errors, "depth_mse"), mean_of(errors, "mean_depth_mse")
+def _state_rows(means: Mapping[str, Any]) -> list[list[str]]:
     return [
-        ["camera ATE, not aligned (m)", f"{ate:.3f}", f"zero motion {still:.3f}, constant velocity {steady:.3f}"],
-        ["depth latents, squared error", f"{depth:.3f}", f"training mean {mean_depth:.3f}"],
+        [
+            "camera ATE, not aligned (m)",
+            _number(means["ate_rmse_unaligned_m"]),
+            f"zero motion {_number(means['ate_rmse_zero_motion_m'])}, "
+            f"constant velocity {_number(means['ate_rmse_constant_velocity_m'])}",
+        ],
+        ["camera ATE, Sim(3) (m)", _number(means["ate_rmse_sim3_m"]), ""],
+        *(
+            [label, _number(means[name]), f"constant map {_number(means[f'{name}_constant_map'])}"]
+            for label, name in (
+                ("depth, AbsRel", "depth_abs_rel"),
+                ("depth, delta_1", "depth_delta1"),
+                ("depth, log RMSE", "depth_log_rmse"),
+            )
+        ),
+        [
+            "depth latents, squared error",
+            _number(means["depth_mse"]),
+            f"training mean {_number(means['mean_depth_mse'])}",
+        ],
     ]
+
+
+def _dream_rows(means: Mapping[str, Any]) -> list[list[str]]:
+    return [
+        [
+            f"dream at +{number + 1}, {label}",
+            _number(means[f"dream_{name}"][number]),
+            f"copy {_number(means[f'copy_{name}'][number])}, "
+            f"shrunk copy {_number(means[f'shrunk_copy_{name}'][number])}",
+        ]
+        for label, name in (("PSNR (dB)", "psnr_db"), ("SSIM", "ssim"))
+        for number in range(len(means[f"dream_{name}"]))
+    ]
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3f}"

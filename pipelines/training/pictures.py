@@ -1,26 +1,20 @@
 """Pictures of a training run: its curves, and what the model makes of a held-out clip."""
 
-from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 import torch
 from torch import Tensor
 
 from pipelines.training.config import HeldOutConfig
-from wsm_data.codecs.base import VideoCodec
-from wsm_data.codecs.depth import depth_m_from_latent_video
 from wsm_data.files.jsonlines import read_lines
 from wsm_data.loaders.batches.batch import Batch
-from wsm_data.schema.depth import DepthRange
-from wsm_data.schema.latent_standard import LatentStandard
 from wsm_data.schema.sequence import frames_of
 from wsm_data.view.clip.pictures import spread_frames
 from wsm_data.view.training.curves import draw_training_curves
 from wsm_data.view.training.dream_sheet import DreamSheet, draw_dream_sheet
-from wsm_model.config import Variant
+from wsm_model.evaluation.decoding import Decoding
+from wsm_model.evaluation.streaming import DreamRequest, dream_bounds, stream_clip
 from wsm_model.inference.sampler import flow_schedule
-from wsm_model.inference.session import Session, StateEstimate
 from wsm_model.losses.pose import raw_frame_poses
 from wsm_model.model import WorldSlamModel
 
@@ -33,33 +27,6 @@ CURVE_UNITS = {
     "learning_rate": "base learning rate (1)",
 }
 _FRAMES_SHOWN = 5
-_SEEN_SHARE = 0.5
-"""Share of a clip that is seen before the dream begins."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Decoding:
-    """What turns latents of a release into pictures.
-
-    Attributes:
-        codec: of the release.
-        standard: how its latents are standardised.
-        depth_range: of its depth.
-    """
-
-    codec: VideoCodec
-    standard: LatentStandard
-    depth_range: DepthRange
-
-    def rgb_u8(self, latents: Tensor) -> np.ndarray:
-        """Standardised RGB latents [F, C, h, w] as pictures, uint8 [T, H, W, 3]."""
-        video = self.codec.decode(self.standard.raw_rgb(latents.float().cpu().numpy()))
-        return np.round((np.clip(video, -1.0, 1.0) + 1.0) * 127.5).astype(np.uint8)
-
-    def depth_m(self, latents: Tensor) -> np.ndarray:
-        """Standardised depth latents [F, C, h, w] as metres, float32 [T, H, W]."""
-        video = self.codec.decode(self.standard.raw_depth(latents.float().cpu().numpy()))
-        return depth_m_from_latent_video(video, self.depth_range)
 
 
 def draw_curves(run: Path) -> None:
@@ -92,35 +59,22 @@ def draw_dream(
         shift: gamma of the flow time.
         title: of the sheet.
     """
-    rgb, length = batch.rgb[0].float(), batch.spans[0].length
-    chunk = config.session.chunk_size
-    seen = max(1, min(length - chunk, int(length * _SEEN_SHARE)))
-    end = min(length, seen + chunk)
-    session = Session(model, config.session)
-    episode = session.start()
-    depth, poses = torch.zeros_like(rgb[:end]), torch.zeros_like(batch.poses[0, :end].float())
-    for number, latent in enumerate(rgb[:seen]):
-        (states,) = session.observe([episode], latent[None], [_issued_poses(model, batch, number)])
-        place = slice(states.first, states.first + len(states.poses))
-        poses[place] = states.poses
-        if states.depth is not None:
-            depth[place] = states.depth
-    noise = torch.randn(1, 1, end - seen, *rgb.shape[1:], generator=torch.Generator().manual_seed(0)).to(rgb.device)
-    (dream,) = session.dream(
-        [episode], batch.goal_camera0_m[:1].float(), noise, flow_schedule(config.flow_steps, shift)
+    rgb = batch.rgb[0].float()
+    seen, end = dream_bounds(batch.spans[0].length, config.session.chunk_size)
+    noise = torch.randn(end - seen, *rgb.shape[1:], generator=torch.Generator().manual_seed(0)).to(rgb.device)
+    request = DreamRequest(
+        after=seen,
+        goal_camera0_m=batch.goal_camera0_m[0].float(),
+        noise=noise,
+        schedule=flow_schedule(config.flow_steps, shift),
     )
-    if path is None:
+    streamed = stream_clip(model, rgb[:seen], config.session, issued_FM7=batch.poses[0, :seen].float(), request=request)
+    dream = streamed.dream
+    if path is None or dream is None:
         return
-    poses[seen:] = dream.poses[0]
-    estimated = None if dream.depth is None else torch.cat([depth[:seen], dream.depth[0]])
+    poses = torch.cat([streamed.poses, dream.poses[0]])
+    estimated = None if dream.depth is None else torch.cat([streamed.depth, dream.depth[0]])
     _draw(path, batch, decoding, title, seen=seen, end=end, dreamed=dream.rgb[0], depth=estimated, poses=poses)
-
-
-def _issued_poses(model: WorldSlamModel, batch: Batch, latent: int) -> StateEstimate | None:
-    """The true poses of a latent, where the model must be told them."""
-    if model.config.variant is Variant.SLAM:
-        return None
-    return StateEstimate(first=latent, depth=None, poses=batch.poses[0, latent : latent + 1].float())
 
 
 def _draw(

@@ -28,14 +28,18 @@ from pipelines.running.interrupts import termination_noted
 from pipelines.training.config import TrainRunConfig
 from pipelines.training.data import held_out_loader, model_config, training_loader
 from pipelines.training.evaluation import evaluate
-from pipelines.training.pictures import Decoding, draw_curves, draw_dream
+from pipelines.training.pictures import draw_curves, draw_dream
 from wsm_data.access.release import open_release
 from wsm_data.errors import ConfigError
 from wsm_data.files.atomic import write_text
+from wsm_data.files.digest import digest_json
 from wsm_data.loaders.batches.batch import Batch
 from wsm_data.loaders.loader import ClipLoader
+from wsm_data.schema.latent_standard import LatentStandard
 from wsm_data.shards.latent_standard import latent_standard
 from wsm_data.shards.release_codec import codec_of
+from wsm_model.config import ModelConfig
+from wsm_model.evaluation.decoding import Decoding
 from wsm_model.model import WorldSlamModel
 from wsm_model.model_file import ModelCard, load_model, save_model
 from wsm_model.ranks import leave_ranks, rank_and_world_size, shard_model, start_ranks, unsharded, wait_for_all
@@ -77,13 +81,17 @@ def run_training(config: TrainRunConfig, out: Path, *, quiet: bool) -> str | Non
         leave_ranks()
 
 
-def identity_of(config: TrainRunConfig, loader: ClipLoader) -> dict[str, object]:
+def identity_of(
+    config: TrainRunConfig, loader: ClipLoader, shape: ModelConfig, standard: LatentStandard
+) -> dict[str, object]:
     """What checkpoints of a run must agree on, by dotted name; the loader's own state covers data and order."""
     training = {
         name: value for name, value in dataclasses.asdict(config.training).items() if name not in _NOT_PART_OF_A_RUN
     }
     parts = {
         "model": dataclasses.asdict(config.model),
+        "shape": dataclasses.asdict(shape),
+        "latent_standard": digest_json(dataclasses.asdict(standard)),
         "training": training,
         "dtype_of_latents": config.read.dtype,
         "steps_of_an_epoch": loader.steps,
@@ -97,7 +105,7 @@ def _run(config: TrainRunConfig, out: Path, device: torch.device, quiet: bool) -
         release = loader.sources.tables[0].release
         torch.manual_seed(config.training.seed)
         model = WorldSlamModel(model_config(config, release.manifest), config.model.attention).to(device)
-        identity = identity_of(config, loader)
+        identity = identity_of(config, loader, model.config, latent_standard(release.manifest))
         if config.model.weights and not checkpoints(out / "checkpoints"):
             _fill_with_wan(config, out, model)
         shard_model(model, device)
@@ -232,7 +240,15 @@ def _evaluate(config: TrainRunConfig, out: Path, device: torch.device, quiet: bo
         standard = latent_standard(loader.sources.tables[0].release.manifest)
         model, _ = load_model(out / "model", standard)
         shift = config.training.loss.flow_shift
-        return evaluate(model.to(device), loader, config.held_out, out / "evaluation.json", shift=shift, quiet=quiet)
+        return evaluate(
+            model.to(device),
+            loader,
+            config.held_out,
+            out / "evaluation.json",
+            decoding=_decoding(config),
+            shift=shift,
+            quiet=quiet,
+        )
 
 
 def _dotted(parts: Mapping[str, Any], where: str = "") -> Iterator[tuple[str, object]]:

@@ -12,9 +12,12 @@ import torch
 from pipelines.training.config import HeldOutConfig, TrainRunConfig
 from pipelines.training.data import held_out_loader
 from pipelines.training.evaluation import evaluate, evaluation_table
+from wsm_data.codecs.dct import DctCodec
 from wsm_data.loaders.config import SourceConfig
+from wsm_data.shards.latent_standard import latent_standard
 from wsm_model.config import Variant
-from wsm_model.evaluation.held_out import ClipErrors, FlowErrors
+from wsm_model.evaluation.decoding import Decoding
+from wsm_model.evaluation.flow import FlowErrors
 from wsm_model.inference.session import SessionConfig
 from wsm_model.model import WorldSlamModel
 from wsm_model.presets import preset
@@ -35,7 +38,11 @@ def evaluated(tiny, tmp_path) -> Callable[..., SimpleNamespace]:
         config = TrainRunConfig(sources=(SourceConfig(release=str(tiny.folder)),), held_out=held_out)
         path = tmp_path / name
         with held_out_loader(config, CPU) as loader:
-            table = evaluate(WorldSlamModel(shape).eval(), loader, held_out, path, shift=5.0, quiet=True)
+            decoding = Decoding(
+                codec=DctCodec(), standard=latent_standard(tiny.manifest), depth_range=tiny.manifest.depth_range
+            )
+            model = WorldSlamModel(shape).eval()
+            table = evaluate(model, loader, held_out, path, decoding=decoding, shift=5.0, quiet=True)
         return SimpleNamespace(table=table, record=json.loads(path.read_text()), path=path)
 
     return run
@@ -45,21 +52,19 @@ def test_the_file_holds_every_clip_and_the_table_their_means(evaluated, tiny):
     found = evaluated()
     clips = found.record["clips"]
     assert sorted(clip["key"] for clip in clips) == sorted(clip.meta.key for clip in tiny.clips[-2:])
-    means = {name: sum(clip[name] for clip in clips) / 2 for name in clips[0] if name != "key"}
-    flow = found.record["flow"]
-    assert [" ".join(line.split()) for line in found.table.splitlines()] == [
-        "mean over 2 held-out clips model beside it",
-        f"camera ATE, not aligned (m) {means['ate_rmse_unaligned_m']:.3f} "
-        f"zero motion {means['ate_rmse_zero_motion_m']:.3f}, "
-        f"constant velocity {means['ate_rmse_constant_velocity_m']:.3f}",
-        f"depth latents, squared error {means['depth_mse']:.3f} training mean {means['mean_depth_mse']:.3f}",
-        f"flow matching {flow['model']:.3f} copy {flow['copy']:.3f}, unconditional {flow['unconditional']:.3f}",
-    ]
+    for name in ("ate_rmse_unaligned_m", "ate_rmse_constant_velocity_m", "depth_mse"):
+        assert found.record[name] == pytest.approx(sum(clip["states"][name] for clip in clips) / 2)
+    assert found.record["depth_abs_rel"] == pytest.approx(sum(one["states"]["depth"]["abs_rel"] for one in clips) / 2)
+    assert f"camera ATE, not aligned (m)   {found.record['ate_rmse_unaligned_m']:.3f}" in found.table
+    assert f"constant map {found.record['depth_abs_rel_constant_map']:.3f}" in found.table
+    for name in ("dream_psnr_db", "copy_psnr_db", "shrunk_copy_psnr_db"):
+        assert len(found.record[name]) == HELD_OUT.session.chunk_size
 
 
 def test_an_untrained_camera_stays_and_has_the_error_of_zero_motion(evaluated):
     for clip in evaluated().record["clips"]:
-        assert clip["ate_rmse_unaligned_m"] == pytest.approx(clip["ate_rmse_zero_motion_m"], rel=1e-6)
+        states = clip["states"]
+        assert states["ate_rmse_unaligned_m"] == pytest.approx(states["ate_rmse_zero_motion_m"], rel=1e-6)
 
 
 def test_the_same_model_and_clips_give_the_same_bytes(evaluated):
@@ -80,27 +85,37 @@ def test_fewer_clips_than_asked_for_are_announced_and_counted(evaluated, caplog)
     assert "mean over 2 held-out clips" in found.table
 
 
-def test_without_slam_there_is_the_flow_alone(evaluated):
+def test_without_slam_there_are_dreams_and_the_flow_alone(evaluated):
     found = evaluated(variant=Variant.IDM)
-    assert found.record["clips"] == []
+    assert [clip["states"] for clip in found.record["clips"]] == [None, None]
     assert set(found.record["flow"]) == {"model", "copy", "unconditional"}
-    assert [line.split()[0] for line in found.table.splitlines()] == ["mean", "flow"]
+    assert "depth_abs_rel" not in found.record
+    assert [line.split()[0] for line in found.table.splitlines()] == ["mean", *["dream"] * 4, "flow"]
     assert "mean over 2 held-out clips" in found.table
 
 
 def test_the_table_shows_what_it_was_given():
-    error = ClipErrors(
-        key="a",
-        ate_rmse_unaligned_m=0.1,
-        ate_rmse_zero_motion_m=1.0,
-        ate_rmse_constant_velocity_m=2.0,
-        depth_mse=0.25,
-        mean_depth_mse=1.0,
-    )
-    table = evaluation_table([error, replace(error, ate_rmse_unaligned_m=0.3, depth_mse=0.75)], FLOW, 2)
-    assert table == (
-        "mean over 2 held-out clips    model  beside it\n"
-        "camera ATE, not aligned (m)   0.200  zero motion 1.000, constant velocity 2.000\n"
-        "depth latents, squared error  0.500  training mean 1.000\n"
-        "flow matching                 1.250  copy 2.500, unconditional 1.500"
-    )
+    means = {
+        "ate_rmse_unaligned_m": 0.2,
+        "ate_rmse_sim3_m": None,
+        "ate_rmse_zero_motion_m": 1.0,
+        "ate_rmse_constant_velocity_m": 2.0,
+        "depth_mse": 0.5,
+        "mean_depth_mse": 1.0,
+        **{f"depth_{name}": 0.25 for name in ("abs_rel", "delta1", "log_rmse")},
+        **{f"depth_{name}_constant_map": 0.75 for name in ("abs_rel", "delta1", "log_rmse")},
+        **{f"{name}_psnr_db": [20.0] for name in ("dream", "copy", "shrunk_copy")},
+        **{f"{name}_ssim": [0.5] for name in ("dream", "copy", "shrunk_copy")},
+    }
+    assert [" ".join(line.split()) for line in evaluation_table(means, FLOW, 2).splitlines()] == [
+        "mean over 2 held-out clips model beside it",
+        "camera ATE, not aligned (m) 0.200 zero motion 1.000, constant velocity 2.000",
+        "camera ATE, Sim(3) (m) -",
+        "depth, AbsRel 0.250 constant map 0.750",
+        "depth, delta_1 0.250 constant map 0.750",
+        "depth, log RMSE 0.250 constant map 0.750",
+        "depth latents, squared error 0.500 training mean 1.000",
+        "dream at +1, PSNR (dB) 20.000 copy 20.000, shrunk copy 20.000",
+        "dream at +1, SSIM 0.500 copy 0.500, shrunk copy 0.500",
+        "flow matching 1.250 copy 2.500, unconditional 1.500",
+    ]

@@ -1,70 +1,63 @@
 """What is measured on held-out clips."""
 
-from types import SimpleNamespace
-
-import numpy as np
 import pytest
 import torch
 
-from wsm_model.evaluation.held_out import clip_errors, estimate_states, flow_matching_errors
-from wsm_model.inference.session import SessionConfig
-
-CONFIG = SessionConfig(chunk_size=2, cache_latents=16)
+from wsm_model.config import Variant
+from wsm_model.evaluation.held_out import clip_errors
 
 
 @pytest.fixture
-def batch(make_poses, make_spans):
-    torch.manual_seed(0)
-    poses = make_poses(2, 5, 4)
-    poses[:, 0] = torch.tensor([0.0, 0, 0, 1, 0, 0, 0])
-    return SimpleNamespace(
-        still=torch.zeros(2, 5, 4, dtype=torch.bool),
-        rgb=torch.randn(2, 5, 6, 4, 6),
-        depth=torch.randn(2, 5, 6, 4, 6),
-        poses=poses,
-        spans=make_spans([5, 4], [2, 2]),
-        goal_camera0_m=torch.randn(2, 3),
-        refs=np.arange(2),
-        keys=("a", "b"),
-        epoch=0,
-        step=0,
-    )
-
-
-def test_every_latent_keeps_the_last_of_its_estimates(make_model, batch):
-    model = make_model()
-    depth, poses = estimate_states(model, batch.rgb[0], CONFIG)
-    whole_chunk, _ = estimate_states(model, batch.rgb[0, :3], CONFIG)
-    assert torch.equal(depth[:3], whole_chunk)
-    assert (poses[..., 3:].norm(dim=-1) - 1).abs().max() < 1e-5
-
-
-def test_a_camera_that_stays_where_it_was_has_the_error_of_zero_motion(make_model, batch):
-    model = make_model()
+def still_model(make_model):
+    """A model that takes every camera for one that stays."""
+    model = make_model(latent_channels=48)
     head = model.expert(model.config.experts[-1]).head
     torch.nn.init.zeros_(head.linear_2.weight)
     head.linear_2.bias.data = torch.tensor([0.0, 0, 0, 1, 0, 0, 0])
-    for one in clip_errors(model, batch, CONFIG):
-        assert one.ate_rmse_unaligned_m == pytest.approx(one.ate_rmse_zero_motion_m, rel=1e-6)
-        assert one.mean_depth_mse == pytest.approx(1.0, abs=0.2)  # standard normal latents
+    return model
 
 
-def test_still_frames_that_were_added_do_not_count(make_model, batch):
-    model = make_model()
+def test_a_camera_that_stays_where_it_was_has_the_error_of_zero_motion(still_model, batch, make_settings):
+    for one in clip_errors(still_model, batch, make_settings()):
+        assert one.states.ate_rmse_unaligned_m == pytest.approx(one.states.ate_rmse_zero_motion_m, rel=1e-6)
+        assert one.states.mean_depth_mse == pytest.approx(1.0, abs=0.2)  # standard normal latents
+
+
+def test_still_frames_that_were_added_do_not_count(still_model, batch, make_settings):
     batch.still[:, 3:] = True
-    before = clip_errors(model, batch, CONFIG)
+    settings = make_settings()
+    before = [one.states for one in clip_errors(still_model, batch, settings)]
     batch.poses[:, 3:, :, :3] += 7.0
-    for one, other in zip(before, clip_errors(model, batch, CONFIG), strict=True):
-        assert (one.ate_rmse_unaligned_m, one.ate_rmse_zero_motion_m) == (
-            other.ate_rmse_unaligned_m,
-            other.ate_rmse_zero_motion_m,
-        )
-        assert one.ate_rmse_constant_velocity_m == other.ate_rmse_constant_velocity_m
+    after = [one.states for one in clip_errors(still_model, batch, settings)]
+    assert [(one.ate_rmse_unaligned_m, one.ate_rmse_zero_motion_m, one.constant_map) for one in before] == [
+        (one.ate_rmse_unaligned_m, one.ate_rmse_zero_motion_m, one.constant_map) for one in after
+    ]
+    assert [one.ate_rmse_constant_velocity_m for one in before] == [one.ate_rmse_constant_velocity_m for one in after]
 
 
-def test_copying_is_exact_where_nothing_changes_and_the_unconditional_guess_is_right_on_average(make_model, batch):
-    model = make_model()
-    batch.rgb = batch.rgb[:, :1].expand(-1, 5, -1, -1, -1).clone()
-    errors = flow_matching_errors(model, [batch], seed=0, shift=5.0)
-    assert errors.copy == pytest.approx(0.0, abs=1e-9)
-    assert 0 < errors.unconditional < 2.2  # at most the variance of eps - x, times weights of mean one
+def test_centres_on_one_line_have_no_aligned_error(still_model, batch, make_settings):
+    batch.poses[..., 1:3] = 0.0
+    assert [one.states.ate_rmse_sim3_m for one in clip_errors(still_model, batch, make_settings())] == [None, None]
+
+
+def test_a_scene_that_stays_is_copied_without_error(still_model, batch, make_settings):
+    batch.rgb = batch.rgb[:, :1].expand_as(batch.rgb).clone()
+    for one in clip_errors(still_model, batch, make_settings()):
+        assert one.dream.copy.mse == (0.0, 0.0)
+        assert one.dream.copy.ssim == pytest.approx((1.0, 1.0))
+        assert one.dream.shrunk_copy.mse == pytest.approx((0.0, 0.0), abs=1e-10)  # the factor is 1 up to rounding
+        assert min(one.dream.dream.mse) > 0.01
+
+
+def test_frames_without_anything_in_common_are_guessed_best_by_their_mean(still_model, batch, make_settings):
+    """Independent latents of variance 1: a copy has twice the squared error of the mean, a factor near 0 about once."""
+    for one in clip_errors(still_model, batch, make_settings()):
+        assert sum(one.dream.shrunk_copy.mse) < 0.7 * sum(one.dream.copy.mse)
+
+
+def test_without_slam_there_are_dreams_alone(make_model, batch, make_settings):
+    model = make_model(Variant.IDM, latent_channels=48)
+    found = clip_errors(model, batch, make_settings())
+    assert [one.key for one in found] == ["a", "b"]
+    assert [one.states for one in found] == [None, None]
+    assert [len(one.dream.dream.mse) for one in found] == [2, 2]
