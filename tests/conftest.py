@@ -1,6 +1,9 @@
 """For all tests: the same property-test examples everywhere; a small synthetic source, and the pipeline over it."""
 
+import fcntl
 import hashlib
+import os
+import shutil
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -40,19 +43,37 @@ def small_synth(**changes: object) -> SynthConfig:
 
 
 @pytest.fixture(scope="session")
-def make_source(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+def make_once(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, Callable[[Path], object]], Path]:
+    """Fills a folder of a name once for all processes of the tests; nobody may change what is in it."""
+    base = tmp_path_factory.getbasetemp()
+    common = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
+
+    def make(name: str, fill: Callable[[Path], object]) -> Path:
+        folder, done = common / name, common / f"{name}.done"
+        with (common / f"{name}.lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            if not done.exists():
+                shutil.rmtree(folder, ignore_errors=True)
+                fill(folder)
+                done.touch()
+        return folder
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def make_source(make_once: Callable[[str, Callable[[Path], object]], Path]) -> Callable[..., Path]:
     """Generates a source tree once per set of settings."""
-    made: dict[SynthConfig, Path] = {}
 
     def make(**changes: object) -> Path:
         config = small_synth(**changes)
-        if config not in made:
-            out = tmp_path_factory.mktemp("source")
+
+        def write(out: Path) -> None:
             for scene in range(config.scenes):
                 for camera in config.cameras:
                     write_scene(out, scene, camera, config)
-            made[config] = out
-        return made[config]
+
+        return make_once(f"source-{hashlib.sha256(repr(config).encode()).hexdigest()[:16]}", write)
 
     return make
 
@@ -85,6 +106,13 @@ def run_pipeline() -> RunPipeline:
         }
 
     return run
+
+
+@pytest.fixture(scope="session")
+def homes_release(make_source: Callable[..., Path], run_pipeline: RunPipeline, make_once: Callable[..., Path]) -> Path:
+    """A release of two homes, three drives of either camera in each."""
+    run = make_once("homes", lambda out: run_pipeline(make_source(scenes=2, trajectories=3), out))
+    return run / "pack" / "release"
 
 
 @pytest.fixture(scope="session")

@@ -23,10 +23,8 @@ from wsm_model.model_file import ModelCard, save_model
 
 
 @pytest.fixture(scope="module")
-def release(make_source, run_pipeline, tmp_path_factory) -> str:
-    out = tmp_path_factory.mktemp("run")
-    run_pipeline(make_source(scenes=2, trajectories=3), out)
-    return str(out / "pack" / "release")
+def release(homes_release) -> str:
+    return str(homes_release)
 
 
 def wsm(*words):

@@ -38,18 +38,25 @@ max_latents = 6
 
 
 @pytest.fixture(scope="module")
-def release(make_source, run_pipeline, tmp_path_factory) -> str:
+def release(homes_release) -> str:
     """A small release of generated homes."""
-    out = tmp_path_factory.mktemp("run")
-    run_pipeline(make_source(scenes=2, trajectories=3), out)
-    return str(out / "pack" / "release")
+    return str(homes_release)
 
 
-@pytest.fixture
-def settings(tmp_path) -> str:
-    path = tmp_path / "train.toml"
+@pytest.fixture(scope="module")
+def settings(tmp_path_factory) -> str:
+    path = tmp_path_factory.mktemp("settings") / "train.toml"
     path.write_text(SETTINGS)
     return str(path)
+
+
+@pytest.fixture(scope="module")
+def trained(release, settings, tmp_path_factory) -> tuple[Path, str]:
+    """The folder of a run that came to its end, and what it said."""
+    out = tmp_path_factory.mktemp("trained") / "run"
+    code, text = wsm("train", release, "--out", str(out), "-c", settings, "--quiet")
+    assert code == 0, text
+    return out, text
 
 
 def wsm(*words: str) -> tuple[int, str]:
@@ -58,10 +65,8 @@ def wsm(*words: str) -> tuple[int, str]:
     return done.exit_code, done.output
 
 
-def test_a_run_leaves_model_metrics_pictures_ledger_and_evaluation(release, settings, tmp_path):
-    out = tmp_path / "run"
-    code, text = wsm("train", release, "--out", str(out), "-c", settings, "--quiet")
-    assert code == 0, text
+def test_a_run_leaves_model_metrics_pictures_ledger_and_evaluation(release, trained):
+    out, text = trained
     assert "camera ATE, not aligned (m)" in text
     metrics = [json.loads(line) for line in (out / "metrics.jsonl").read_text().splitlines()]
     assert [line["step"] for line in metrics] == [1, 2, 3]
@@ -77,18 +82,16 @@ def test_a_run_leaves_model_metrics_pictures_ledger_and_evaluation(release, sett
     assert audited == 0, said
 
 
-def test_the_same_command_again_trains_no_step_more(release, settings, tmp_path):
-    out = tmp_path / "run"
-    for _ in range(2):
-        code, text = wsm("train", release, "--out", str(out), "-c", settings, "--quiet")
-        assert code == 0, text
+def test_the_same_command_again_trains_no_step_more(release, settings, trained):
+    out, _ = trained
+    code, text = wsm("train", release, "--out", str(out), "-c", settings, "--quiet")
+    assert code == 0, text
     assert [json.loads(line)["step"] for line in (out / "metrics.jsonl").read_text().splitlines()] == [1, 2, 3]
     assert [path.name for path in checkpoints(out / "checkpoints")] == ["step-000002", "step-000003"]
 
 
-def test_other_settings_in_the_same_folder_are_refused(release, settings, tmp_path):
-    out = tmp_path / "run"
-    wsm("train", release, "--out", str(out), "-c", settings, "--quiet")
+def test_other_settings_in_the_same_folder_are_refused(release, settings, trained):
+    out, _ = trained
     code, text = wsm("train", release, "--out", str(out), "-c", settings, "-s", "training.seed=5", "--quiet")
     assert code == 2
     assert "training.seed: 0 -> 5" in text

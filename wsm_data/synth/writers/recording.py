@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -9,7 +10,7 @@ from wsm_data.schema.camera import Intrinsics
 from wsm_data.schema.point_cloud import PointCloud
 from wsm_data.synth.config import CAMERAS, SynthConfig
 from wsm_data.synth.drive.expert import Episode, plan_episode
-from wsm_data.synth.drive.occupancy import scene_columns
+from wsm_data.synth.drive.occupancy import SceneColumns, scene_columns
 from wsm_data.synth.home.home import Home, make_home
 from wsm_data.synth.render.render import make_buffers, render
 from wsm_data.synth.writers.cloud import scene_cloud
@@ -41,8 +42,7 @@ class SceneRecording:
 
 def plan_recording(scene_index: int, camera: str, config: SynthConfig) -> SceneRecording:
     """Build the home and plan all episodes of one camera in it."""
-    home = make_home(config.seed, scene_index, config.ground_clearance_m)
-    columns = scene_columns(home)
+    home, columns = _scene(config.seed, scene_index, config.ground_clearance_m)
     episodes = tuple(
         plan_episode(home, columns, _stream(config, scene_index, camera, _EPISODE_STREAM, number), config)
         for number in range(config.trajectories)
@@ -55,6 +55,13 @@ def plan_recording(scene_index: int, camera: str, config: SynthConfig) -> SceneR
         scene_index=scene_index,
         camera=camera,
     )
+
+
+@lru_cache(maxsize=1)
+def _scene(seed: int, scene_index: int, ground_clearance_m: float) -> tuple[Home, SceneColumns]:
+    """The home and what is above each of its places; kept for the scene's next camera, since they take longest."""
+    home = make_home(seed, scene_index, ground_clearance_m)
+    return home, scene_columns(home)
 
 
 def record_frames(recording: SceneRecording, number: int, config: SynthConfig) -> Iterator[tuple[bytes, bytes]]:
