@@ -8,4 +8,4 @@ sys.path.insert(0, str(Path(__file__).parent / "fakes"))
 sys.path.insert(0, str(Path(__file__).parents[1] / "wsm_data" / "fakes"))
 
 from fake_runs import calls, config, fakes_on_path, out, source  # noqa: F401
-from tiny_release import clips, make_clip, tiny  # noqa: F401
+from tiny_release import clips, make_clip, packed_tiny, tiny  # noqa: F401

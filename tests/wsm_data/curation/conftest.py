@@ -16,7 +16,7 @@ from wsm_data.curation.scores_table import Direction, ScorerInfo, ScoreTable
 sys.path.insert(0, str(Path(__file__).parents[1] / "fakes"))
 
 from surveyed_selection import selected, survey_of  # noqa: F401
-from tiny_release import build_clip, clips, make_clip, tiny  # noqa: F401
+from tiny_release import build_clip, clips, make_clip, packed_tiny, tiny  # noqa: F401
 
 from wsm_data.schema.clip import Clip
 from wsm_data.schema.occupancy import FREE, OCCUPIED

@@ -11,7 +11,7 @@ from wsm_data.access.release import read_manifest
 from wsm_data.access.shard_reader import Span
 from wsm_data.files.stores import open_store
 
-PART_BYTES = 20_000
+PART_BYTES = 50_000
 
 
 def main(url: str, cache_dir: str, cache_bytes: str) -> None:

@@ -1,5 +1,6 @@
 """Small valid clips, and a release of six of them in three scenes."""
 
+import shutil
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import SimpleNamespace
@@ -164,9 +165,16 @@ def clips() -> tuple[Clip, ...]:
     return tuple(build_clip(unit, latents=3 + number % 3) for number, unit in enumerate(UNITS))
 
 
+@pytest.fixture(scope="session")
+def packed_tiny(tmp_path_factory: pytest.TempPathFactory, clips: tuple[Clip, ...]) -> tuple[Path, ReleaseManifest]:
+    """The folder and manifest of the release that `tiny` copies."""
+    folder = tmp_path_factory.mktemp("packed") / "release"
+    return folder, pack(folder, clips, shard_bytes=200_000)
+
+
 @pytest.fixture
-def tiny(tmp_path: Path, clips: tuple[Clip, ...]) -> SimpleNamespace:
+def tiny(tmp_path: Path, clips: tuple[Clip, ...], packed_tiny: tuple[Path, ReleaseManifest]) -> SimpleNamespace:
     """A release of the seven clips in three shards: its folder, its manifest, and `pack` to make others."""
-    folder = tmp_path / "release"
-    manifest = pack(folder, clips, shard_bytes=200_000)
+    original, manifest = packed_tiny
+    folder = Path(shutil.copytree(original, tmp_path / "release"))
     return SimpleNamespace(folder=folder, manifest=manifest, clips=clips, pack=pack, codec=CODEC, refused=REFUSED)

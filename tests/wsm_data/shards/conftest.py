@@ -5,4 +5,4 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "fakes"))
 
-from tiny_release import clips, make_clip, tiny  # noqa: F401
+from tiny_release import clips, make_clip, packed_tiny, tiny  # noqa: F401
