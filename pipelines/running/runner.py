@@ -17,23 +17,17 @@ from pipelines.running.conflict import conflict, fingerprint
 from pipelines.running.engines.choice import Engine
 from pipelines.running.engines.local import run_local
 from pipelines.running.folder import (
-    PENDING_FILE,
-    QUARANTINE_FILE,
-    LedgerEntry,
     StageRecord,
-    compact_ledger,
     digest_on_disk,
     is_as_written,
-    is_whole,
-    ledger_appender,
     locked,
-    read_ledger,
     read_stage_record,
-    write_quarantine,
     write_stage_record,
 )
 from pipelines.running.full_disk import full_disk_named
+from pipelines.running.ledger import LedgerEntry, compact_ledger, is_whole, ledger_appender, read_ledger
 from pipelines.running.options import RunOptions
+from pipelines.running.quarantine import PENDING_FILE, QUARANTINE_FILE, write_pending, write_quarantine
 from pipelines.running.settings import config_json, settings_of
 from pipelines.running.stage import REFUSED, ConfigT, Finished, Outcome, Settled, Stage, StageContext, Unit, refused
 from pipelines.running.stage_report import StageReport, stage_report
@@ -41,7 +35,6 @@ from pipelines.running.upstream import pending_units, quarantine_of, upstream_re
 from wsm_data.errors import BudgetExceeded, ConfigError, DataError, WsmError
 from wsm_data.files.atomic import remove_temporaries
 from wsm_data.files.digest import digest_json
-from wsm_data.files.jsonlines import write_lines
 from wsm_data.schema.verdict import Refusal
 
 
@@ -302,7 +295,7 @@ def _finish(job: _Job[ConfigT]) -> None:
     _keep_to_budget(job, count_refusals(outcomes, len(job.units), job.stage.parts_fact, end.refusals), end.refusals)
     _write_refusals(job, end.refusals)
     compact_ledger(job.out, {unit: job.ledger[unit] for unit in settled.outcomes}, _stale(job))
-    write_lines(job.out / PENDING_FILE, [{"unit": unit} for unit in settled.pending])
+    write_pending(job.out, settled.pending)
     outputs = {output: digest_on_disk(job.out / output) for output in (PENDING_FILE, QUARANTINE_FILE, *end.outputs)}
     write_stage_record(job.out, replace(job.record, finished=_state(job), outputs=outputs))
 

@@ -1,8 +1,8 @@
 """What a stage is: a frozen bundle of plain functions that turn inputs into files, unit by unit."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any, Generic, TypeAlias, TypeVar
 
 from wsm_data.errors import DataError
@@ -58,6 +58,11 @@ class Outcome:
     refusals: tuple[Refusal, ...] = ()
     seconds: float = 0.0
     digests: tuple[str | None, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.state not in (DONE, REFUSED):
+            raise ValueError(f"state must be {DONE} or {REFUSED}, found {self.state!r}")
+        require_inside(self.outputs)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -137,3 +142,15 @@ AnyStage: TypeAlias = Stage[Any]
 def refused(unit: Unit, error: DataError) -> Outcome:
     """Outcome of a unit that cannot be used."""
     return Outcome(unit=unit.id, state=REFUSED, refusals=(Refusal.from_error(unit.id, unit.source, error),))
+
+
+def require_inside(outputs: Iterable[str]) -> None:
+    """Refuse outputs outside the folder of a stage, below which they are looked for, and deleted.
+
+    Raises:
+        ValueError: a name leads out of the folder, or is none.
+    """
+    for output in outputs:
+        path = PurePosixPath(output)
+        if path.is_absolute() or ".." in path.parts or not path.parts:
+            raise ValueError(f"outputs must lie inside the folder, found {output!r}")

@@ -3,19 +3,12 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from pipelines.running.folder import (
-    PENDING_FILE,
-    QUARANTINE_FILE,
-    StageRecord,
-    digest_on_disk,
-    read_ledger,
-    read_stage_record,
-    refusal_from_json,
-)
+from pipelines.running.folder import StageRecord, digest_on_disk, read_stage_record
+from pipelines.running.ledger import read_ledger
+from pipelines.running.quarantine import PENDING_FILE, QUARANTINE_FILE, read_pending, read_quarantine
 from pipelines.running.settings import input_fields
 from pipelines.running.stage import DONE, Outcome
 from wsm_data.errors import ConfigError, IntegrityError
-from wsm_data.files.jsonlines import read_lines
 from wsm_data.schema.verdict import Refusal
 
 DAMAGED_SUFFIX = ".damaged"
@@ -63,12 +56,12 @@ def done_outcomes(folder: Path) -> Mapping[str, Outcome]:
 
 def quarantine_of(folder: Path) -> tuple[Refusal, ...]:
     """Every refusal an upstream stage wrote down."""
-    return tuple(refusal_from_json(line) for line in read_lines(vouched_by_record(folder, QUARANTINE_FILE)))
+    return read_quarantine(vouched_by_record(folder, QUARANTINE_FILE))
 
 
 def pending_units(folder: Path) -> tuple[str, ...]:
     """Ids of the units that an upstream stage was not asked to work on, or did not come to."""
-    return tuple(str(line["unit"]) for line in read_lines(vouched_by_record(folder, PENDING_FILE)))
+    return read_pending(vouched_by_record(folder, PENDING_FILE))
 
 
 def vouched_by_record(folder: Path, output: str) -> Path:

@@ -8,14 +8,15 @@ from typing import Any
 
 from pipelines.artifacts.layout import map_path, surface_path
 from pipelines.artifacts.source import conventions_digest, indexed_source
-from pipelines.running.folder import refusal_from_json
 from pipelines.running.stage import Outcome, Stage, StageContext, Unit, refused
 from pipelines.running.upstream import done_outcomes, vouched_by_ledger
 from wsm_data.errors import DataError, Reason
 from wsm_data.files.digest import digest_json
+from wsm_data.files.json_values import from_json
 from wsm_data.files.typed_toml import INPUT
 from wsm_data.maps.scene_map import build_scene_map, floor_levels, save_scene_map, scene_map_digest
 from wsm_data.maps.voxels import load_voxels
+from wsm_data.schema.verdict import Refusal
 
 
 class WithoutCloud(StrEnum):
@@ -69,7 +70,7 @@ def _process(batch: Sequence[Unit], config: MapConfig, context: StageContext) ->
 def _map_scene(unit: Unit, config: MapConfig, out: Path) -> Outcome:
     facts = unit.payload.facts
     if facts["cloud_refusal"] is not None:
-        refusal = refusal_from_json(facts["cloud_refusal"])
+        refusal = from_json(Refusal, facts["cloud_refusal"])
         raise DataError(refusal.reason, refusal.message, refusal.details)
     voxels = load_voxels(vouched_by_ledger(config.index, unit.payload, surface_path(config.index, unit.id)))
     if voxels.origin != "cloud" and config.without_cloud is WithoutCloud.REFUSE:

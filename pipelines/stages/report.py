@@ -5,7 +5,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from pipelines.registry import STAGES
-from pipelines.running.folder import read_ledger, read_stage_record
+from pipelines.running.folder import read_stage_record
+from pipelines.running.ledger import read_ledger
 from pipelines.running.stage import DONE, REFUSED, Outcome, Stage, StageContext, Unit
 from pipelines.running.upstream import pending_units
 from wsm_data.access.release import open_release, read_manifest

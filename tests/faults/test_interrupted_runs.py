@@ -8,7 +8,8 @@ import pytest
 from fake_runs import ANY, copies
 from fake_stages import COPY
 
-from pipelines.running.folder import locked, read_ledger, read_stage_record
+from pipelines.running.folder import locked, read_stage_record
+from pipelines.running.ledger import read_ledger
 from pipelines.running.runner import run_stage
 from wsm_data.errors import BudgetExceeded, ConfigError, WsmError
 

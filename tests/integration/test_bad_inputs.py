@@ -14,7 +14,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from pipelines.running.folder import read_ledger
+from pipelines.running.ledger import read_ledger
 from wsm_data.access.release import open_release
 from wsm_data.access.verify import verify_release
 from wsm_data.errors import BudgetExceeded, ConfigError

@@ -1,7 +1,7 @@
-"""Frozen dataclasses as JSON objects, and back by the types of their fields, exactly."""
+"""Frozen dataclasses as JSON objects, and back by the types of their fields, exactly; whole files of them too."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from pathlib import Path
@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 
 from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.files.differences import differences
+from wsm_data.files.jsonlines import read_lines
 from wsm_data.files.typed_toml import build_config
 
 ValueT = TypeVar("ValueT")
@@ -73,3 +74,22 @@ def load_json(kind: type[ValueT], path: Path, must_hold: str, remedy: str) -> Va
         return from_json(kind, json.loads(path.read_bytes()), complete=False)
     except (OSError, ValueError) as error:
         raise IntegrityError(f"{path} must hold {must_hold}, but: {error}; {remedy}") from error
+
+
+def load_json_lines(kind: type[ValueT], path: Path, must_hold: str, remedy: str) -> Iterator[ValueT]:
+    """The dataclasses whose JSON objects the lines of a file hold; fields that have a default may be missing.
+
+    Args:
+        kind: the dataclass.
+        path: the file; one that does not exist has no lines.
+        must_hold: what each line must hold, for the message.
+        remedy: what to do about a line that does not.
+
+    Raises:
+        IntegrityError: a line does not hold such an object.
+    """
+    for number, record in enumerate(read_lines(path), start=1):
+        try:
+            yield from_json(kind, record, complete=False)
+        except ValueError as error:
+            raise IntegrityError(f"{path}:{number} must hold {must_hold}, but: {error}; {remedy}") from error

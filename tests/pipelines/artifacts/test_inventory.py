@@ -9,10 +9,9 @@ from hypothesis import strategies as st
 
 from pipelines.artifacts.episode_table import EpisodeRow, write_episodes
 from pipelines.artifacts.inventory import account_of
-from pipelines.running.folder import PENDING_FILE, QUARANTINE_FILE
+from pipelines.running.folder import StageRecord
+from pipelines.running.quarantine import write_pending, write_quarantine
 from wsm_data.errors import Reason
-from wsm_data.files.json_values import to_json
-from wsm_data.files.jsonlines import write_lines
 from wsm_data.schema.identity import EpisodeId
 from wsm_data.schema.verdict import Refusal
 from wsm_data.shards.conservation import check_conservation
@@ -20,6 +19,7 @@ from wsm_data.shards.index import IndexTable
 from wsm_data.shards.inventory import InventoryRow, UnitState, parse_inventory, write_inventory
 
 SCENE = "box_zed/hall"
+RECORD = StageRecord(name="index", version=1, settings={}, config={}, fingerprint="f", inputs={}, seen={})
 FOLDER, ARCHIVE = SCENE, f"{SCENE}.tar.gz"
 
 
@@ -51,12 +51,12 @@ class Stages:
             for name, source in accepted
         ]
         write_episodes(self.index, rows)
-        write_lines(self.index / QUARANTINE_FILE, [{**to_json(one), "time": 17.5} for one in refused])
-        write_lines(self.index / PENDING_FILE, [{"unit": name} for name in pending])
+        write_quarantine(self.index, RECORD, refused)
+        write_pending(self.index, pending)
 
     def encoded(self, clips=(), refused=()):
         self.clips = {name: f"content of {name}" for name in clips}
-        write_lines(self.encode / QUARANTINE_FILE, [{**to_json(one), "time": 17.5} for one in refused])
+        write_quarantine(self.encode, RECORD, refused)
 
     def account(self):
         splits = dict.fromkeys(self.clips, "train")

@@ -26,3 +26,12 @@ def test_nothing_to_deal_is_an_empty_table(tmp_path):
 def test_a_table_that_is_gone_is_not_taken_for_an_empty_one(tmp_path):
     with pytest.raises(IntegrityError, match=r"split\.jsonl is missing; run `wsm split` again"):
         read_split(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "line", ['{"id": "a/b/1"}', '{"id": "a/b/1", "split": 1}', '{"id": "a/b/1", "split": "test", "x": 1}']
+)
+def test_a_line_that_is_no_row_is_damage(tmp_path, line):
+    (tmp_path / SPLIT_FILE).write_text(line + "\n")
+    with pytest.raises(IntegrityError, match=r"split\.jsonl:1 must hold the split of a trajectory, but: .*wsm split"):
+        read_split(tmp_path)

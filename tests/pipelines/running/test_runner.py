@@ -6,7 +6,8 @@ import pytest
 from fake_runs import ANY, copies
 from fake_stages import COPY, COPY_VERSION_2, JOIN, CopyConfig, JoinConfig, Letters
 
-from pipelines.running.folder import read_ledger, read_stage_record
+from pipelines.running.folder import read_stage_record
+from pipelines.running.ledger import read_ledger
 from pipelines.running.runner import run_stage
 from wsm_data.errors import BudgetExceeded, ConfigError, WsmError
 from wsm_data.files.jsonlines import read_lines

@@ -6,7 +6,8 @@ import pytest
 from fake_runs import ANY
 from fake_stages import COPY, JOIN, JoinConfig
 
-from pipelines.running.folder import read_ledger, read_stage_record
+from pipelines.running.folder import read_stage_record
+from pipelines.running.ledger import read_ledger
 from pipelines.running.runner import run_stage
 from pipelines.running.stage import Finished
 from pipelines.running.upstream import (

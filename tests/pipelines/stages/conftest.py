@@ -10,7 +10,7 @@ import pytest
 from box_room import MANIFEST_TOML, UPSTAIRS, Drive, Room, along_x, scene_files, write_archive, write_folder
 
 from pipelines.registry import load_stage
-from pipelines.running.folder import read_ledger
+from pipelines.running.ledger import read_ledger
 from pipelines.running.options import RunOptions
 from pipelines.running.runner import run_stage
 from pipelines.running.stage import Outcome, Stage, Unit

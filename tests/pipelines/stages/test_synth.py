@@ -4,7 +4,7 @@ import pytest
 import trimesh
 
 from pipelines.registry import load_stage
-from pipelines.running.folder import read_ledger
+from pipelines.running.ledger import read_ledger
 from pipelines.running.options import RunOptions
 from pipelines.running.runner import run_stage
 from wsm_data.readers.interndata.containers import find_containers

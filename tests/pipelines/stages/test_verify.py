@@ -5,7 +5,8 @@ import fsspec
 import pytest
 from box_room import along_x
 
-from pipelines.running.folder import read_ledger, read_stage_record
+from pipelines.running.folder import read_stage_record
+from pipelines.running.ledger import read_ledger
 from pipelines.stages.verify import require_sound
 from wsm_data.access.release import open_release
 from wsm_data.errors import ConfigError, IntegrityError

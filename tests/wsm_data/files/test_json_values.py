@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wsm_data.errors import IntegrityError
-from wsm_data.files.json_values import from_json, load_json, to_json
+from wsm_data.files.json_values import from_json, load_json, load_json_lines, to_json
 
 
 class Colour(StrEnum):
@@ -112,3 +112,13 @@ def test_a_file_that_is_missing_or_holds_something_else_is_damaged(tmp_path, con
         load_json(Point, path, "a point", "write it again")
     path.write_text('{"x_m": 0.5}')
     assert load_json(Point, path, "a point", "write it again") == Point(0.5)
+
+
+def test_lines_are_read_one_by_one_and_a_wrong_one_is_named(tmp_path):
+    path = tmp_path / "points.jsonl"
+    assert list(load_json_lines(Point, path, "a point", "write it again")) == []
+    path.write_text('{"x_m": 0.5}\n{"x_m": 1.5, "name": "b"}\n{"y_m": 2.5}\n')
+    points = load_json_lines(Point, path, "a point", "write it again")
+    assert [next(points), next(points)] == [Point(0.5), Point(1.5, "b")]
+    with pytest.raises(IntegrityError, match=r"points\.jsonl:3 must hold a point, but: .*y_m.*; write it again"):
+        next(points)

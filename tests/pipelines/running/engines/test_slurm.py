@@ -9,7 +9,7 @@ from fake_stages import COPY, CopyConfig
 from fake_tasks import die, fail_but_two, numbers_below, process_id, refuse
 
 from pipelines.running.engines.slurm import run_slurm
-from pipelines.running.folder import read_ledger
+from pipelines.running.ledger import read_ledger
 from pipelines.running.options import RunOptions
 from pipelines.running.runner import run_stage
 from wsm_data.errors import DataError, WsmError
