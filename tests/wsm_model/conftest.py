@@ -50,7 +50,7 @@ def config() -> ModelConfig:
     return CONFIG
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def make_model() -> Callable[..., WorldSlamModel]:
     """Builds a model whose every weight is random: none is at the zero that some begin with."""
 
@@ -93,7 +93,7 @@ def make_spans() -> Callable[..., tuple[SequenceSpan, ...]]:
     return spans_of
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def make_poses() -> Callable[..., torch.Tensor]:
     """`random_poses`."""
     return random_poses

@@ -3,16 +3,17 @@
 import json
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from wsm_data.files.sealed import sealed, unsealed
 
 VALUES = st.recursive(
-    st.none() | st.integers() | st.text() | st.floats(allow_nan=False, allow_infinity=False), st.lists
+    st.none() | st.integers() | st.text() | st.floats(allow_nan=False, allow_infinity=False), st.lists, max_leaves=10
 )
 
 
+@settings(max_examples=40)
 @given(st.dictionaries(st.text().filter(lambda name: name != "xxh3"), VALUES))
 def test_through_json_it_comes_back_equal(record):
     assert unsealed(json.loads(json.dumps(sealed(record)))) == record

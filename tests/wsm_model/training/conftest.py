@@ -65,13 +65,13 @@ class Stop(Exception):
     """Ends a run in the middle, as a kill would."""
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def make_loader(make_poses) -> Callable[..., RandomLoader]:
     """Builds a loader; `spoil` puts a NaN into a tensor of a step."""
     return lambda spoil=None: RandomLoader(make_poses, spoil)
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def settings() -> TrainingConfig:
     """Six steps in float32 with a checkpoint after every second."""
     return TrainingConfig(
@@ -82,7 +82,7 @@ def settings() -> TrainingConfig:
     )
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def run(make_model, make_loader):
     """Trains a new model in a folder, from its checkpoints if it has any; returns model and metrics."""
 
@@ -108,3 +108,11 @@ def run(make_model, make_loader):
         return model, lines
 
     return train_in
+
+
+@pytest.fixture(scope="session")
+def undisturbed(run, settings, tmp_path_factory) -> SimpleNamespace:
+    """A run to its end: its folder, which nobody changes, the model and the metrics."""
+    folder = tmp_path_factory.mktemp("undisturbed")
+    model, lines = run(folder, settings)
+    return SimpleNamespace(folder=folder, model=model, lines=lines)

@@ -14,20 +14,21 @@ def weights(model: torch.nn.Module) -> torch.Tensor:
     return torch.cat([parameter.detach().flatten() for parameter in model.parameters()])
 
 
-def test_a_run_that_is_killed_and_resumed_ends_in_the_same_bits(run, settings, tmp_path):
-    undisturbed, whole = run(tmp_path / "a", settings)
-    run(tmp_path / "b", settings, kill_after=3)  # after its checkpoint of step 2
-    resumed, rest = run(tmp_path / "b", settings)
+def test_a_run_that_is_killed_and_resumed_ends_in_the_same_bits(run, settings, undisturbed, tmp_path):
+    run(tmp_path, settings, kill_after=3)  # after its checkpoint of step 2
+    resumed, rest = run(tmp_path, settings)
     assert [line["step"] for line in rest] == [3, 4, 5, 6]
-    assert torch.equal(weights(resumed), weights(undisturbed))
-    assert [line["loss"] for line in rest] == [line["loss"] for line in whole[2:]]
+    assert torch.equal(weights(resumed), weights(undisturbed.model))
+    assert [line["loss"] for line in rest] == [line["loss"] for line in undisturbed.lines[2:]]
 
 
-def test_parts_of_a_step_add_up_to_the_step(run, settings, tmp_path):
-    whole, lines = run(tmp_path / "a", settings)
-    parts, part_lines = run(tmp_path / "b", replace(settings, micro_rows=1))
-    assert part_lines[0]["loss"] == pytest.approx(lines[0]["loss"], rel=1e-6)  # float32, summed in another order
-    torch.testing.assert_close(weights(parts), weights(whole), rtol=0, atol=1e-4)  # a tenth of one step of AdamW
+def test_parts_of_a_step_add_up_to_the_step(run, settings, undisturbed, tmp_path):
+    parts, lines = run(tmp_path, replace(settings, micro_rows=1))
+    whole = undisturbed.lines
+    assert lines[0]["loss"] == pytest.approx(whole[0]["loss"], rel=1e-6)  # float32, summed in another order
+    torch.testing.assert_close(
+        weights(parts), weights(undisturbed.model), rtol=0, atol=1e-4
+    )  # a tenth of one step of AdamW
 
 
 def test_only_the_latest_checkpoints_are_kept(run, settings, tmp_path):
@@ -52,10 +53,9 @@ def test_a_loss_that_is_not_finite_is_named_by_its_parts(run, settings, tmp_path
         run(tmp_path, wild)
 
 
-def test_checkpoints_of_another_run_are_refused_with_the_difference(run, settings, tmp_path):
-    run(tmp_path, settings)
+def test_checkpoints_of_another_run_are_refused_with_the_difference(run, settings, undisturbed):
     with pytest.raises(ConfigError, match='model: "small" -> "large"'):
-        run(tmp_path, settings, identity={"model": "large"})
+        run(undisturbed.folder, settings, identity={"model": "large"})
 
 
 def test_the_loss_falls_on_batches_seen_again_and_again(run, settings, tmp_path, make_loader, monkeypatch):
