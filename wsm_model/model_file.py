@@ -21,6 +21,7 @@ from wsm_data.files.typed_toml import build_config
 from wsm_data.schema.latent_standard import LatentStandard
 from wsm_model.config import ModelConfig
 from wsm_model.model import WorldSlamModel
+from wsm_model.precision import Precision, matrices
 from wsm_model.ranks import rank_and_world_size, wait_for_all, whole
 
 WEIGHTS_FILE = "model.safetensors"
@@ -82,12 +83,15 @@ def load_card(folder: Path) -> ModelCard:
         raise IntegrityError(f"{path} must be the card of a model, but: {error}; restore the file") from error
 
 
-def load_model(folder: Path, standard: LatentStandard | None = None) -> tuple[WorldSlamModel, ModelCard]:
+def load_model(
+    folder: Path, standard: LatentStandard | None = None, precision: Precision = Precision.FLOAT32
+) -> tuple[WorldSlamModel, ModelCard]:
     """Read a model, in evaluation mode.
 
     Args:
         folder: of the model.
         standard: of the latents it is to be used on; None where that is checked by the caller.
+        precision: how its matrices are kept in memory; in bfloat16 it is for use and not for training.
 
     Raises:
         ConfigError: there is no model, or it was trained on latents of another codec or other statistics.
@@ -100,8 +104,9 @@ def load_model(folder: Path, standard: LatentStandard | None = None) -> tuple[Wo
     found = sha256_file(path) if path.is_file() else "no file"
     if found != card.weights_sha256:
         raise IntegrityError(f"{path} must have sha256 {card.weights_sha256}, found {found}; restore the file")
-    model = WorldSlamModel(card.config)
-    _fill(model, path)
+    with torch.device("meta"):
+        model = WorldSlamModel(card.config)
+    _fill(model, path, precision)
     return model.eval(), card
 
 
@@ -120,8 +125,11 @@ def require_standard(card: ModelCard, standard: LatentStandard) -> None:
         )
 
 
-def _fill(model: nn.Module, path: Path) -> None:
+def _fill(model: nn.Module, path: Path, precision: Precision) -> None:
+    """Give a model on the meta device its parameters; no more than one tensor is there twice."""
     parameters: Mapping[str, nn.Parameter] = dict(model.named_parameters())
+    rounded = matrices(model) if precision is Precision.BFLOAT16 else set()
+    filled: dict[str, torch.Tensor] = {}
     try:
         with safe_open(path, framework="pt") as file:
             names = set(file.keys())
@@ -129,13 +137,13 @@ def _fill(model: nn.Module, path: Path) -> None:
                 raise ValueError(
                     f"its tensors must be those of the model, differing: {sorted(names ^ set(parameters))[:3]}"
                 )
-            with torch.no_grad():
-                for name, parameter in parameters.items():
-                    tensor = file.get_tensor(name)
-                    if tensor.shape != parameter.shape:
-                        raise ValueError(
-                            f"{name} must have the shape {tuple(parameter.shape)}, found {tuple(tensor.shape)}"
-                        )
-                    parameter.copy_(tensor)
+            for name, parameter in parameters.items():
+                tensor = file.get_tensor(name)
+                if tensor.shape != parameter.shape:
+                    raise ValueError(
+                        f"{name} must have the shape {tuple(parameter.shape)}, found {tuple(tensor.shape)}"
+                    )
+                filled[name] = tensor.to(torch.bfloat16 if name in rounded else torch.float32)
     except (SafetensorError, ValueError) as error:
         raise IntegrityError(f"{path} must hold the weights of its card, but: {error}; restore the file") from error
+    model.load_state_dict(filled, assign=True)

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 from wsm_data.schema.sequence import POSE_SLOTS
 from wsm_model.inference.session import SessionConfig
+from wsm_model.precision import Precision
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -11,6 +12,7 @@ class AgentConfig:
     """Settings of the agent.
 
     Attributes:
+        precision: of the matrix products, and of the weights that they take.
         seed: the noise that dreams start from follows from it.
         flow_steps: sampler steps of a dream (paper: 8).
         flow_shift: gamma of the flow times; as in training.
@@ -26,6 +28,7 @@ class AgentConfig:
             benchmark's controller stands still before a path behind it, and drives none from 95 degrees on.
     """
 
+    precision: Precision = Precision.FLOAT32
     seed: int = 0
     flow_steps: int = 8
     flow_shift: float = 5.0

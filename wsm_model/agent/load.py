@@ -36,6 +36,6 @@ def load_agent(
             f"the model in {folder} must see latents of the codec that it was trained on, {standard.codec} with digest "
             f"{standard.codec_digest}, found digest {found}; use a model of this version, or the weights of its codec"
         )
-    model, card = load_model(folder)
+    model, card = load_model(folder, precision=config.precision)
     chosen = device or ("cuda" if torch.cuda.is_available() else "cpu")
     return Agent(model.to(chosen), Eye(codec, card.standard, card.config), config, watcher)

@@ -102,7 +102,7 @@ def query_states(
     reach = Reach(own=Side.STATE, sides=frozenset(Side), dreamed=dreamed)
     done = model.run(streams, lambda layer, tokens: _gather(tokens, layer, histories, reach), context)
     return States(
-        depth=model.expert(Expert.DEPTH).read(done[Expert.DEPTH]) if Expert.DEPTH in done else None,
+        depth=model.expert(Expert.DEPTH).read(done[Expert.DEPTH]).float() if Expert.DEPTH in done else None,
         poses=model.expert(Expert.POSE).read(done[Expert.POSE]),
     )
 
@@ -127,7 +127,7 @@ def velocity(
     done = model.run(
         {Expert.GENERATION: stream}, lambda layer, tokens: _gather(tokens, layer, histories, reach), context
     )
-    read = expert.read(done[Expert.GENERATION])
+    read = expert.read(done[Expert.GENERATION]).float()
     return velocity_of(model.config.prediction, read, noisy, torch.full(noisy.shape[:2], flow_time).to(noisy))
 
 

@@ -23,6 +23,7 @@ from wsm_model.inference.passes import (
 from wsm_model.inference.sampler import integrate
 from wsm_model.layers.pose import identity_poses
 from wsm_model.model import WorldSlamModel
+from wsm_model.precision import autocast, stored_precision
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,7 +103,7 @@ class Session:
     What comes of an episode does not depend, but for rounding, on which others it is computed with.
 
     Args:
-        model: in evaluation mode.
+        model: in evaluation mode, its matrices float32 or, to the bit as under autocast, bfloat16.
         config: chunk size and cache.
     """
 
@@ -183,15 +184,16 @@ class Session:
             raise ValueError("a dream needs at least one observed latent; call observe first")
         dreams, frames = noise.shape[1:3]
         histories = [one.history for one in episodes for _ in range(dreams)]
-        goals = self.model.goal(goal_camera0_m).repeat_interleave(dreams, dim=0)
-        context = goals[:, None, None].expand(-1, frames, -1, -1)
+        with self._precision():
+            goals = self.model.goal(goal_camera0_m).repeat_interleave(dreams, dim=0)
+            context = goals[:, None, None].expand(-1, frames, -1, -1)
 
-        def flow(x: Tensor, flow_time: float) -> Tensor:
-            return velocity(self.model, histories, x, flow_time, context)
+            def flow(x: Tensor, flow_time: float) -> Tensor:
+                return velocity(self.model, histories, x, flow_time, context)
 
-        rgb = integrate(flow, noise.flatten(0, 1), list(schedule))
-        clean = clean_rgb(self.model, histories, rgb)
-        states = query_states(self.model, histories, frames, dreamed=clean, context=context)
+            rgb = integrate(flow, noise.flatten(0, 1), list(schedule))
+            clean = clean_rgb(self.model, histories, rgb)
+            states = query_states(self.model, histories, frames, dreamed=clean, context=context)
         found = []
         for number, episode in enumerate(episodes):
             own = slice(number * dreams, (number + 1) * dreams)
@@ -208,12 +210,17 @@ class Session:
         for history in histories:
             history.state.forget_from(self._estimated_from(history.rgb.next))
             history.make_room(frames)
-        clean_rgb(self.model, histories, rgb_NFChw)
-        for history in histories:
-            history.rgb.keep(frames)
-        states = self._estimates(histories) if self._is_slam else self._issued(histories, known, rgb_NFChw.device)
-        self._remember(histories, [own or state for own, state in zip(known, states, strict=True)])
+        with self._precision():
+            clean_rgb(self.model, histories, rgb_NFChw)
+            for history in histories:
+                history.rgb.keep(frames)
+            states = self._estimates(histories) if self._is_slam else self._issued(histories, known, rgb_NFChw.device)
+            self._remember(histories, [own or state for own, state in zip(known, states, strict=True)])
         return states
+
+    def _precision(self) -> torch.autocast:
+        """Matrix products in the precision of the weights."""
+        return autocast(stored_precision(self.model), next(self.model.parameters()).device)
 
     def _estimated_from(self, latent: int) -> int:
         """The first latent whose states are estimated, again or for the first time, when a latent comes."""

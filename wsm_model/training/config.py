@@ -1,16 +1,9 @@
 """Settings of pretraining; the defaults are those of the paper's table "Pretraining hyperparameters"."""
 
 from dataclasses import dataclass, field
-from enum import StrEnum
 
 from wsm_model.losses.total import LossConfig
-
-
-class Precision(StrEnum):
-    """Arithmetic of the matrix products; norms, modulation, residual sums and losses are float32 in either."""
-
-    BFLOAT16 = "bfloat16"
-    FLOAT32 = "float32"
+from wsm_model.precision import Precision
 
 
 @dataclass(frozen=True, kw_only=True)

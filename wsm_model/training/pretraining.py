@@ -1,8 +1,6 @@
 """A step of pretraining on the objective (paper, section 3.3 and appendix B.1)."""
 
 import math
-from contextlib import AbstractContextManager
-from typing import Any
 
 import torch
 from torch import Tensor
@@ -11,8 +9,9 @@ from wsm_data.schema.batch import ClipBatch
 from wsm_model.batches import TrainingInputs, training_inputs
 from wsm_model.losses.total import LossCounts, loss_counts, pretraining_loss
 from wsm_model.model import WorldSlamModel
+from wsm_model.precision import autocast
 from wsm_model.ranks import rank_and_world_size, sum_over_ranks
-from wsm_model.training.config import Precision, TrainingConfig
+from wsm_model.training.config import TrainingConfig
 from wsm_model.training.loop import StepResult, TrainingRun, finish_step
 
 
@@ -53,7 +52,7 @@ def _backward(
     model: WorldSlamModel, part: TrainingInputs, config: TrainingConfig, counts: LossCounts
 ) -> dict[str, float]:
     _, world_size = rank_and_world_size()
-    with _precision(config.precision, part.noise.device):
+    with autocast(config.precision, part.noise.device):
         outputs = model(part.inputs)
     report = pretraining_loss(part.inputs, outputs, part.noise, config.loss, counts)
     (report.total * world_size).backward()  # gradients are averaged over the ranks
@@ -66,10 +65,6 @@ def _global_counts(batch: ClipBatch[Tensor], device: torch.device) -> LossCounts
     own = loss_counts(batch.spans)
     dreamed, latents, sequences = sum_over_ranks([own.dreamed, own.latents, own.sequences], device)
     return LossCounts(dreamed=dreamed, latents=latents, sequences=sequences)
-
-
-def _precision(precision: Precision, device: torch.device) -> AbstractContextManager[Any]:
-    return torch.autocast(device.type, torch.bfloat16, enabled=precision is Precision.BFLOAT16)
 
 
 def _not_finite(batch: ClipBatch[Tensor], wrong: str, bad: list[str]) -> str:

@@ -11,7 +11,8 @@ import pytest
 import torch
 
 from wsm_data.schema.sequence import SequenceSpan
-from wsm_model.training.config import OptimiserConfig, Precision, TrainingConfig
+from wsm_model.precision import Precision
+from wsm_model.training.config import OptimiserConfig, TrainingConfig
 from wsm_model.training.loop import Hooks, TrainingRun, resume, train
 from wsm_model.training.pretraining import pretraining_step
 from wsm_model.training.schedule import make_optimiser

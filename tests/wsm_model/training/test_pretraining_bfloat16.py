@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 import torch
 
+from wsm_model.precision import Precision
 from wsm_model.training.checkpoint import checkpoints
-from wsm_model.training.config import Precision
 
 pytestmark = pytest.mark.filterwarnings("ignore:Mismatch dtype between input and weight")
 
