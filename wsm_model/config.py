@@ -74,6 +74,8 @@ class ModelConfig:
             silent).
         goal_base_rad_per_m: lowest of those frequencies: half a turn in 32 m, beyond the longest episodes (paper
             silent).
+        goal_tokens: S, tokens that predictions attend to across. The goal is one; with more, as Wan2.2's text has, the
+            cross-attention has queries, keys and their norms too.
         pose_hidden: width of the pose head's hidden layer (paper silent).
         clean_state_time: timestep that clean states are modulated with (paper silent).
         state_query_time: timestep that state queries are modulated with (paper silent).
@@ -97,6 +99,7 @@ class ModelConfig:
     norm_eps: float = 1e-6
     goal_frequencies: int = 10
     goal_base_rad_per_m: float = 0.09817477042468103
+    goal_tokens: int = 1
     pose_hidden: int = 768
     clean_state_time: float = 0.0
     state_query_time: float = 1000.0
@@ -113,7 +116,7 @@ class ModelConfig:
             raise ValueError(f"head_width must be even and at least 6 for rotary positions, found {self.head_width}")
         if self.time_frequencies % 2:
             raise ValueError(f"time_frequencies must be even, found {self.time_frequencies}")
-        for name in ("layers", "heads", "pose_slots", "goal_frequencies", "pose_hidden"):
+        for name in ("layers", "heads", "pose_slots", "goal_frequencies", "goal_tokens", "pose_hidden"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} must be at least 1, found {getattr(self, name)}")
 

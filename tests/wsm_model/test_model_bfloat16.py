@@ -119,13 +119,13 @@ def test_norms_of_queries_and_keys_are_computed_in_float32(make_model):
 
 
 def test_the_affine_norm_before_the_goal_is_computed_in_float32(make_model):
-    cross = make_model().layers[0].experts[Expert.GENERATION.value].cross_attention
+    cross = make_model(goal_tokens=2).layers[0].experts[Expert.GENERATION.value].cross_attention
     nn.init.normal_(cross.norm.weight)
     nn.init.normal_(cross.norm.bias)
     seen: list[torch.Tensor] = []
     cross.to_q.register_forward_pre_hook(lambda _, given: seen.append(given[0]))
     generator = torch.Generator().manual_seed(0)
-    x, context = (torch.randn(1, 4, size, 48, generator=generator).bfloat16() for size in (6, 1))
+    x, context = (torch.randn(1, 4, size, 48, generator=generator).bfloat16() for size in (6, 2))
     with torch.no_grad(), bfloat16():
         cross(x, context)
     wanted = functional.layer_norm(

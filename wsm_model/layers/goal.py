@@ -2,7 +2,7 @@
 
 The paper embeds the goal as a token for cross-attention and says no more; Fourier features and a two-layer network are
 decided here. Attention over a single key gives that key's value whatever the query is: the goal enters each layer as a
-learned bias of the noisy RGB tokens.
+learned bias of the noisy RGB tokens, and is computed as such (`OneTokenAttention`).
 """
 
 import torch

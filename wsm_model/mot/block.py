@@ -79,6 +79,27 @@ class CrossAttention(Projections):
         return self.to_out(found.transpose(-3, -2).flatten(-2)).to(x_BFPD.dtype)
 
 
+class OneTokenAttention(nn.Module):
+    """`CrossAttention` to a single token, exactly: the softmax over one key is 1, whatever is asked.
+
+    So queries, keys and the norms before them have no part in what comes out, and no gradient: at the paper's size
+    566 million parameters, which are neither kept nor trained.
+
+    Args:
+        width: D.
+        config: the model.
+    """
+
+    def __init__(self, width: int, config: ModelConfig):
+        super().__init__()
+        self.to_v = nn.Linear(config.generation.width, config.attention_width)
+        self.to_out = nn.Linear(config.attention_width, width)
+
+    def forward(self, x_BFPD: Tensor, context_BF1D: Tensor) -> Tensor:
+        """Change of tokens [B, F, P, D] by the one token [B, F, 1, D of the generation expert]: the same for all P."""
+        return self.to_out(self.to_v(context_BF1D)).to(x_BFPD.dtype)
+
+
 class ExpertBlock(nn.Module):
     """A transformer layer of one expert.
 
@@ -98,7 +119,8 @@ class ExpertBlock(nn.Module):
             nn.GELU(approximate="tanh"),
             nn.Linear(widths.feed_forward_width, widths.width),
         )
-        self.cross_attention = CrossAttention(widths.width, config) if sees_goal(config, expert) else None
+        across = OneTokenAttention if config.goal_tokens == 1 else CrossAttention
+        self.cross_attention = across(widths.width, config) if sees_goal(config, expert) else None
 
     def before_attention(self, x: Tensor, modulation: Tensor, rope: tuple[Tensor, Tensor]) -> QueriesKeysValues:
         """Queries, keys and values of tokens.
