@@ -125,7 +125,7 @@ class TestLeakage:
 
 
 def test_the_full_size_has_the_parameters_and_tokens_of_the_paper():
-    """5.0, 1.25 and 0.45 billion within 1 % where the goal has queries and keys; 124 cached and 248 training tokens a latent (specification, 4 and 5)."""
+    """5.0, 1.25 and 0.45 billion within 1 % with queries and keys across; 124 cached, 248 training tokens a latent."""
     with torch.device("meta"):
         model = WorldSlamModel(replace(preset("wsm5b"), goal_tokens=2))
     counts = dict.fromkeys(Expert, 0)
