@@ -21,7 +21,7 @@ def test_a_served_planner_answers_and_ends_in_order(number):
     ) as process:
         first = process.stdout.readline()
         host, port = first.split("http://")[1].split(",")[0].split(":")
-        connection = http.client.HTTPConnection(host, int(port), timeout=20)
+        connection = http.client.HTTPConnection(host, int(port), timeout=120)
         connection.request("GET", "/health")
         health = json.loads(connection.getresponse().read())
         connection.close()

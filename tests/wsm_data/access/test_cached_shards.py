@@ -75,7 +75,7 @@ def test_a_shard_is_downloaded_once_however_many_threads_want_it(open_reader, pu
     for thread in threads:
         thread.start()
     for thread in threads:
-        thread.join(timeout=30)
+        thread.join(timeout=120)
     assert len(remote.proxy.requests(shard)) == 1
 
 
@@ -234,7 +234,7 @@ def test_closing_gives_up_what_hangs_and_ends_the_threads(open_reader, published
     wait_for(lambda: remote.proxy.spoiled() >= 1)
     reader.close()
     reader.close()
-    waiting.join(timeout=30)
+    waiting.join(timeout=120)
     assert len(outcomes) == 1
     assert "closed" in outcomes[0]
     assert not [thread.name for thread in threading.enumerate() if thread.name.startswith(("wsm-fetch", "wsm-ahead"))]

@@ -203,7 +203,7 @@ class _Handler(BaseHTTPRequestHandler):
     def _hang(self) -> None:
         """Say nothing until the client closes the connection, or the proxy is closed."""
         self.connection.settimeout(0.1)
-        until = time.monotonic() + 30
+        until = time.monotonic() + 120
         while time.monotonic() < until and not self.server.proxy.is_closing:
             try:
                 if not self.connection.recv(1):

@@ -102,7 +102,7 @@ def test_two_writers_of_one_path_in_one_process_do_not_mix(tmp_path):
 
     def write(letter):
         with atomic_file(path) as file:
-            both_open.wait(timeout=10)
+            both_open.wait(timeout=120)
             for _ in range(100):
                 file.write(letter * 1000)
 

@@ -161,7 +161,7 @@ def test_closing_ends_what_is_asked_and_what_pauses(spoilt):
         time.sleep(0.01)
     store.close()
     for thread in (pausing, asking):
-        thread.join(timeout=20)
+        thread.join(timeout=120)
     assert ["was closed" in outcome for outcome in outcomes] == [True, True]
     with pytest.raises(StoreError, match="was closed"):
         store.exists("data")
@@ -185,7 +185,7 @@ def test_a_store_works_on_in_a_forked_process(store):
     results = context.SimpleQueue()
     child = context.Process(target=lambda: results.put(store.read("data")))
     child.start()
-    child.join(timeout=30)
+    child.join(timeout=120)
     assert child.exitcode == 0
     assert results.get() == DATA
 

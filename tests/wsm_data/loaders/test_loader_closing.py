@@ -51,7 +51,7 @@ def own_threads():
 
 
 def wait_until_asked(remote):
-    until = time.monotonic() + 30
+    until = time.monotonic() + 120
     while not remote.proxy.spoiled():
         assert time.monotonic() < until
         time.sleep(0.01)

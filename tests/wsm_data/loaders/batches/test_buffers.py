@@ -184,7 +184,7 @@ def test_nobody_waits_on_when_the_moment_ends_just_as_others_take_what_comes_bac
         for thread in threads:
             thread.start()
         for thread in threads:
-            thread.join(timeout=20)
+            thread.join(timeout=120)
         assert not any(thread.is_alive() for thread in threads)
     finally:
         sys.setswitchinterval(interval_s)

@@ -86,7 +86,7 @@ def test_a_step_without_parts_has_a_result():
 
 def test_threads_share_the_parts_of_a_step():
     """Both threads must come to the same step: each part waits for the other one."""
-    both = threading.Barrier(2, timeout=10)
+    both = threading.Barrier(2, timeout=120)
 
     class Meeting(Step):
         def make(self, part: int) -> None:
@@ -162,12 +162,12 @@ def test_of_a_step_that_is_dropped_no_further_part_is_made():
     def begin(step: int) -> Step:
         if step == 1:
             begun.set()
-            assert go_on.wait(timeout=10)
+            assert go_on.wait(timeout=120)
         return reading.begin(step)
 
     stream = Prefetch(iter(range(5)), begin, reading.announce, threads=1, depth=1)
     next(stream)
-    assert begun.wait(timeout=10)
+    assert begun.wait(timeout=120)
     stream._drop()
     go_on.set()
     stream.close()
@@ -181,5 +181,5 @@ def test_threads_end_when_nobody_refers_to_the_stream_any_more():
     assert threads
     del stream
     for thread in threads:
-        thread.join(timeout=5)
+        thread.join(timeout=120)
         assert not thread.is_alive()

@@ -56,7 +56,7 @@ class Client:
         self.server = server
 
     def send(self, path, body, kind="application/json", method="POST"):
-        connection = http.client.HTTPConnection(*self.server.server_address, timeout=20)
+        connection = http.client.HTTPConnection(*self.server.server_address, timeout=120)
         with contextlib.closing(connection):
             connection.request(method, path, body, {"Content-Type": kind})
             response = connection.getresponse()
@@ -96,7 +96,7 @@ def depth(batch, metres=2.0):
 
 
 def raw(client, data):
-    sock = socket.create_connection(client.server.server_address, timeout=20)
+    sock = socket.create_connection(client.server.server_address, timeout=120)
     sock.sendall(data)
     return sock
 
