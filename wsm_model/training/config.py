@@ -18,7 +18,9 @@ class OptimiserConfig:
         beta_1: decay of the first moment.
         beta_2: decay of the second moment.
         eps: added to the root of the second moment.
-        weight_decay: decoupled, of all parameters.
+        weight_decay: decoupled.
+        decay_vectors: whether norms, biases and tables of modulation decay too, as everything does in the paper, which
+            names no exception; otherwise matrices alone.
         clip_norm: largest norm of the gradient of all parameters.
     """
 
@@ -30,6 +32,7 @@ class OptimiserConfig:
     beta_2: float = 0.95
     eps: float = 1e-8
     weight_decay: float = 0.01
+    decay_vectors: bool = True
     clip_norm: float = 2.0
 
     def __post_init__(self) -> None:

@@ -1,6 +1,7 @@
 """Learning rate as a pure function of the step, and the parameter groups it applies to (paper, appendix B.1)."""
 
 import math
+from collections import defaultdict
 from typing import Any
 
 import torch
@@ -24,23 +25,28 @@ def learning_rate(step: int, steps: int, config: OptimiserConfig) -> float:
 
 
 def make_optimiser(model: nn.Module, config: OptimiserConfig) -> torch.optim.AdamW:
-    """AdamW with two groups: generation expert and goal embedding, and everything else."""
-    slower: list[nn.Parameter] = []
-    others: list[nn.Parameter] = []
+    """AdamW with a group for each learning rate (generation expert and goal embedding, everything else) and decay."""
+    members: dict[tuple[float, float], list[nn.Parameter]] = defaultdict(list)
     for name, parameter in model.named_parameters():
         is_slower = expert_of_parameter(name) in (Expert.GENERATION, None)
-        (slower if is_slower else others).append(parameter)
+        decays = config.decay_vectors or not _is_vector(name, parameter)
+        key = (config.generation_factor if is_slower else 1.0, config.weight_decay if decays else 0.0)
+        members[key].append(parameter)
     groups: list[dict[str, Any]] = [
-        {"params": slower, _FACTOR: config.generation_factor},
-        {"params": others, _FACTOR: 1.0},
+        {"params": parameters, _FACTOR: factor, "weight_decay": decay}
+        for (factor, decay), parameters in members.items()
     ]
     return torch.optim.AdamW(
         groups,
         lr=config.learning_rate,
         betas=(config.beta_1, config.beta_2),
         eps=config.eps,
-        weight_decay=config.weight_decay,
     )
+
+
+def _is_vector(name: str, parameter: nn.Parameter) -> bool:
+    """Whether a parameter is a norm's, a bias, or a table of modulation, which is a few vectors."""
+    return parameter.dim() < 2 or name.endswith("table")
 
 
 def set_learning_rate(optimiser: torch.optim.Optimizer, rate: float) -> None:

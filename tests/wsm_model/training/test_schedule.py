@@ -52,3 +52,19 @@ def test_settings_that_make_no_schedule_are_refused(changes):
 def test_settings_that_make_no_optimiser_are_refused_by_name(changes):
     with pytest.raises(ValueError, match=f"^{next(iter(changes))} must"):
         OptimiserConfig(**changes)
+
+
+def test_norms_biases_and_tables_decay_unless_they_are_exempt(make_model):
+    model = make_model()
+    names = {parameter: name for name, parameter in model.named_parameters()}
+    for decays, wanted in ((True, set()), (False, {"weight", "bias", "table"})):
+        optimiser = make_optimiser(model, OptimiserConfig(decay_vectors=decays))
+        exempt = [
+            (names[one], one.dim())
+            for group in optimiser.param_groups
+            if not group["weight_decay"]
+            for one in group["params"]
+        ]
+        assert {name.rsplit(".", 1)[1] for name, _ in exempt} == wanted
+        assert all(dimensions == 1 or name.endswith("table") for name, dimensions in exempt)
+    assert len(exempt) == sum(one.dim() == 1 or name.endswith("table") for one, name in names.items())

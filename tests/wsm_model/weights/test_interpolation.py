@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from wsm_model.weights.interpolation import resize_dimension, resize_tensor
+from wsm_model.weights.interpolation import kept_variance, resize_dimension, resize_tensor
 
 
 def test_ends_stay_and_between_them_values_lie_on_the_lines():
@@ -25,12 +25,23 @@ def test_dimensions_that_agree_are_copied():
     assert torch.equal(resize_tensor(values, (3, 4), 1), values)
 
 
-def test_a_matrix_with_fewer_inputs_is_scaled_to_keep_the_variance():
-    """sqrt(source / target) where the input shrinks, nothing where it grows."""
-    ones = torch.ones(2, 8)
-    assert torch.allclose(resize_tensor(ones, (2, 2), 1), torch.full((2, 2), 2.0))
-    assert torch.equal(resize_tensor(ones, (2, 16), 1), torch.ones(2, 16))
-    assert torch.equal(resize_tensor(ones, (1, 8), 1), torch.ones(1, 8))
+@pytest.mark.parametrize(
+    ("shape", "growth"), [((150, 300), 1.0), ((300, 150), 2.0), ((150, 150), 2.0), ((70, 600), 1.0)]
+)
+def test_a_matrix_keeps_the_variance_of_independent_entries_and_of_what_comes_out(shape, growth):
+    """300 x 300 standard normal entries: 4 % is four standard errors; half the inputs have twice the variance each."""
+    matrix = torch.randn(300, 300, generator=torch.Generator().manual_seed(0))
+    assert float(resize_tensor(matrix, shape, 1).var()) == pytest.approx(growth, rel=0.04)
+
+
+def test_interpolation_leaves_two_thirds_of_the_variance_and_all_of_it_where_nothing_lies_between():
+    """The mean of (1 - w)^2 + w^2 over w in [0, 1] is 2 / 3; ends and every second entry are taken as they are."""
+    assert kept_variance(3072, 1536) == pytest.approx(2 / 3, abs=1e-3)
+    assert kept_variance(9, 5) == kept_variance(4, 2) == 1.0
+
+
+def test_vectors_are_not_scaled():
+    assert torch.equal(resize_tensor(torch.ones(8), (5,), None), torch.ones(5))
 
 
 def test_another_number_of_dimensions_is_a_bug():
