@@ -16,13 +16,13 @@ _ENDS_WITHIN_S = 20.0
 class Child:
     """Answers requests of `loader_peers.worker`, one at a time."""
 
-    def __init__(self, python: Path, module: str):
-        """Start it and wait until its imports are done."""
+    def __init__(self, python: Path, module: str, bench: Path = _BENCH):
+        """Start it in the folder `bench` of a checkout of the project, and wait until its imports are done."""
         self._module = module
         self._process = subprocess.Popen(
             [python, "-m", "loader_peers.worker", module],
-            cwd=_BENCH,
-            env={**os.environ, "PYTHONPATH": str(_BENCH.parent)},
+            cwd=bench,
+            env={**os.environ, "PYTHONPATH": str(bench.parent)},
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             start_new_session=True,  # so that its own worker processes end with it, whatever state they are in
@@ -38,6 +38,12 @@ class Child:
         self._process.stdin.write(json.dumps({"do": request, **arguments}).encode() + b"\n")
         self._process.stdin.flush()
         return self._answer()
+
+    @property
+    def cpu_s(self) -> float:
+        """Processor time of all its threads so far, s."""
+        fields = Path(f"/proc/{self._process.pid}/stat").read_text().rsplit(")", 1)[1].split()
+        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
     def close(self) -> None:
         """Let it end, and end what is left of it."""
