@@ -4,7 +4,7 @@ A mount is not stated there: height and pitch of a trajectory are those of its f
 """
 
 import hashlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -59,18 +59,42 @@ class Recording:
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Piece:
-    """One trajectory of a recording, read."""
+class PieceImages:
+    """What was read of the images of one trajectory.
 
-    id: EpisodeId
-    frames: slice
+    Attributes:
+        frames_digest: of all of them.
+        samples: every n-th depth image.
+        bytes_read: of their files.
+    """
+
     frames_digest: str
     samples: tuple[DepthSample, ...]
     bytes_read: int
 
 
+@dataclass(frozen=True, kw_only=True)
+class _Piece:
+    """One trajectory of a recording, read."""
+
+    id: EpisodeId
+    frames: slice
+    images: PieceImages
+
+
 def scan_recording(folder: Path, recording: Recording, dataset: DatasetManifest, sample_every: int) -> ContainerScan:
     """Read the images of a recording once, and make records of its trajectories.
+
+    Raises:
+        DataError: `floor.unseen`.
+    """
+    return scan_pieces(recording, dataset, lambda frames: _read_files(folder, recording, frames, sample_every))
+
+
+def scan_pieces(
+    recording: Recording, dataset: DatasetManifest, read_images: Callable[[slice], PieceImages]
+) -> ContainerScan:
+    """Make records of the trajectories of a recording, whose images are read by `read_images`, frames given.
 
     Raises:
         DataError: `floor.unseen`.
@@ -82,7 +106,7 @@ def scan_recording(folder: Path, recording: Recording, dataset: DatasetManifest,
         name = f"{recording.episode}_{number:06d}" if recording.episode else f"{number:06d}"
         id_ = EpisodeId(recording.group, recording.scene, (recording.episode if len(cut) == 1 else "") or name)
         try:
-            read.append(_read_piece(folder, recording, id_, frames, sample_every))
+            read.append(_Piece(id=id_, frames=frames, images=read_images(frames)))
         except DataError as error:
             refusals.append(Refusal.from_error(id_.text, recording.container, error))
     floor = _floor_z_m(recording, read, dataset) if read else 0.0
@@ -91,8 +115,8 @@ def scan_recording(folder: Path, recording: Recording, dataset: DatasetManifest,
         refusals=tuple(refusals),
         cloud=None,
         cloud_refusal=None,
-        depth_samples={piece.id.text: piece.samples for piece in read},
-        bytes_read=sum(piece.bytes_read for piece in read),
+        depth_samples={piece.id.text: piece.images.samples for piece in read},
+        bytes_read=sum(piece.images.bytes_read for piece in read),
     )
 
 
@@ -123,7 +147,7 @@ def image_size(folder: Path, name: str, where: str) -> tuple[int, int]:
     return check_rgb(memoryview(read_file(f"{folder}/{name}", f"{where}:{name}")), f"{where}:{name}")
 
 
-def _read_piece(folder: Path, recording: Recording, id_: EpisodeId, frames: slice, every: int) -> _Piece:
+def _read_files(folder: Path, recording: Recording, frames: slice, every: int) -> PieceImages:
     size = recording.intrinsics.width, recording.intrinsics.height
     digests: tuple[list[str], list[str]] = ([], [])
     samples: list[DepthSample] = []
@@ -140,9 +164,7 @@ def _read_piece(folder: Path, recording: Recording, id_: EpisodeId, frames: slic
             total += len(data)
             if kind and index % every == 0:
                 samples.append((index, data))
-    return _Piece(
-        id=id_, frames=frames, frames_digest=digest_frames(*digests), samples=tuple(samples), bytes_read=total
-    )
+    return PieceImages(frames_digest=digest_frames(*digests), samples=tuple(samples), bytes_read=total)
 
 
 def _require_size(found: tuple[int, int], wanted: tuple[int, int], where: str) -> None:
@@ -164,7 +186,7 @@ def _floor_z_m(recording: Recording, read: Sequence[_Piece], dataset: DatasetMan
             recording.T_world_camera[piece.frames][index],
         )
         for piece in read
-        for index, image in piece.samples
+        for index, image in piece.images.samples
     )
     return floor_z_m(frames, recording.intrinsics, recording.container)
 
@@ -182,8 +204,10 @@ def _record(recording: Recording, piece: _Piece, floor: float) -> EpisodeRecord:
         intrinsics=recording.intrinsics,
         camera_height_m=float(T_world_camera[0, 2, 3]) - floor,
         camera_pitch_rad=float(np.arcsin(np.clip(-T_world_camera[0, 2, 2], -1.0, 1.0))),
-        frames_digest=piece.frames_digest,
-        content_digest=_content_digest(piece.frames_digest, T_world_camera, recording.intrinsics, floor, goal_world_m),
+        frames_digest=piece.images.frames_digest,
+        content_digest=_content_digest(
+            piece.images.frames_digest, T_world_camera, recording.intrinsics, floor, goal_world_m
+        ),
         notes=recording.notes,
         goal_world_m=goal_world_m,
     )

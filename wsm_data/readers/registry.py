@@ -5,11 +5,12 @@ from wsm_data.files.typed_toml import did_you_mean
 from wsm_data.readers.array_episodes import ARRAYS
 from wsm_data.readers.guard import guarded
 from wsm_data.readers.interndata.reader import INTERNDATA
+from wsm_data.readers.lerobot.reader import LEROBOT
 from wsm_data.readers.source import SourceReader
 from wsm_data.readers.tum.reader import TUM
 from wsm_data.schema.dataset import DatasetManifest
 
-READERS: tuple[SourceReader, ...] = tuple(guarded(reader) for reader in (INTERNDATA, TUM, ARRAYS))
+READERS: tuple[SourceReader, ...] = tuple(guarded(reader) for reader in (INTERNDATA, TUM, ARRAYS, LEROBOT))
 """Each guarded against what its parsers raise."""
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, fields
 
 from wsm_data.schema.check_limits import CheckLimits
 from wsm_data.schema.depth import DepthEncoding
+from wsm_data.schema.source.lerobot_features import LerobotFeatures
 from wsm_data.schema.source.motion import Motion
 from wsm_data.schema.source.sequence_files import SequenceFiles
 
@@ -100,6 +101,7 @@ class DatasetManifest:
         max_pitch_deg: mounts pitched down by more are taken for damage, degrees.
         motion: how the camera is carried, and which frames are kept.
         files: how the files of a sequence are named, for readers of sequences.
+        features: which features hold what, for LeRobot data sets.
         checks: the other limits beyond which a trajectory is refused.
         limits: what is too large to be read.
         min_frames: shorter trajectories are refused.
@@ -119,6 +121,7 @@ class DatasetManifest:
     max_pitch_deg: float = 45.0
     motion: Motion = field(default_factory=Motion)
     files: SequenceFiles = field(default_factory=SequenceFiles)
+    features: LerobotFeatures = field(default_factory=LerobotFeatures)
     checks: CheckLimits = field(default_factory=CheckLimits)
     limits: ReadLimits = field(default_factory=ReadLimits)
     min_frames: int = 5

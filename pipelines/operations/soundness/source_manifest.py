@@ -8,7 +8,7 @@ from wsm_data.readers.registry import READERS, source_reader
 from wsm_data.schema.dataset import DatasetManifest
 
 GUESSES = (
-    ("arrays", "tum_rgbd", "bonn_rgbd", "replica_sequences", "scannet_sequences", "icl_nuim"),
+    ("arrays", "lerobot", "tum_rgbd", "bonn_rgbd", "replica_sequences", "scannet_sequences", "icl_nuim"),
     ("interndata_n1", "synthetic"),
 )
 """Manifests that are tried; the last ones only where no other fits, for any two folders could be InternData's."""

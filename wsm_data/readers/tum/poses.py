@@ -38,12 +38,24 @@ def read_poses(folder: Path, files: SequenceFiles, camera_axes: str, where: str)
         DataError: `sequence.unreadable`, `trajectory.unreadable`, `file.unreadable`, or `pose.not_rigid`.
     """
     stored = _read_stored(folder, files.poses, where)
+    T_world_camera = in_project_axes(stored.T_world_camera, files, camera_axes, files.poses, where)
+    return StampedTrajectory(stamps_s=np.array(stored.stamps_s), T_world_camera=T_world_camera)
+
+
+def in_project_axes(
+    T_stored: Float64Array, files: SequenceFiles, camera_axes: str, name: str, where: str
+) -> Float64Array:
+    """Stored poses [N, 4, 4] of a tracked body as those of an OpenCV camera in a world with z up.
+
+    Raises:
+        DataError: `pose.not_rigid`: one of them is not, or `files.T_tracked_camera` is not.
+    """
+    require_rigid(T_stored, name, where)
     mirror = _MIRROR if files.world == WorldAxes.Y_UP_LEFT_HANDED else np.eye(4)
     T_tracked_camera = np.array(files.T_tracked_camera, np.float64).reshape(4, 4)
     require_rigid(T_tracked_camera[None], "files.T_tracked_camera of the manifest", where)
     T_stored_camera = T_tracked_camera @ T_STORED_OPENCV[camera_axes] @ mirror
-    T_world_camera = T_WORLD_STORED[files.world] @ stored.T_world_camera @ T_stored_camera
-    return StampedTrajectory(stamps_s=np.array(stored.stamps_s), T_world_camera=T_world_camera)
+    return np.asarray(T_WORLD_STORED[files.world] @ T_stored @ T_stored_camera)
 
 
 def poses_at(trajectory: StampedTrajectory, stamps_s: Float64Array, max_gap_s: float) -> tuple[Float64Array, BoolArray]:
@@ -115,7 +127,6 @@ def _trajectory(poses: list[tuple[float, Float64Array]], name: str, where: str) 
     if not tracked:
         raise unreadable(where, f"{name} must hold a pose, and none of {len(poses)} is finite")
     T_world_stored = np.stack([T for _, T in tracked])
-    require_rigid(T_world_stored, name, where)
     return StampedTrajectory(stamps_s=np.array([stamp for stamp, _ in tracked]), T_world_camera=T_world_stored)
 
 
