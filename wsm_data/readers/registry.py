@@ -10,7 +10,7 @@ from wsm_data.readers.source import SourceReader
 from wsm_data.readers.tum.reader import TUM
 from wsm_data.schema.dataset import DatasetManifest
 
-READERS: tuple[SourceReader, ...] = tuple(guarded(reader) for reader in (INTERNDATA, TUM, ARRAYS, LEROBOT))
+READERS: tuple[SourceReader, ...] = tuple(guarded(reader) for reader in (INTERNDATA, TUM, LEROBOT, ARRAYS))
 """Each guarded against what its parsers raise."""
 
 

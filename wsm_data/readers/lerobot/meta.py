@@ -62,7 +62,7 @@ def read_info(root: Path) -> DatasetInfo:
         DataError: `file.unreadable`, or `sequence.unreadable` where it is not that of version 2 or 3.
     """
     try:
-        said = json.loads(read_file(root / INFO_FILE, INFO_FILE))
+        said = json.loads(read_file(f"{root}/{INFO_FILE}", INFO_FILE))
         version = int(str(said["codebase_version"]).lstrip("v").split(".")[0])
         if version not in (2, 3):
             raise ValueError(f"codebase_version must be 2 or 3, found {said['codebase_version']!r}")
@@ -96,7 +96,7 @@ def read_places(root: Path, info: DatasetInfo, videos: Sequence[str]) -> dict[in
 
 def _version_2(root: Path, info: DatasetInfo, videos: Sequence[str]) -> dict[int, EpisodePlace]:
     lengths: dict[int, int] = {}
-    for line in read_file(root / V2_EPISODES_FILE, V2_EPISODES_FILE).decode().splitlines():
+    for line in read_file(f"{root}/{V2_EPISODES_FILE}", V2_EPISODES_FILE).decode().splitlines():
         if line.strip():
             said = json.loads(line)
             lengths[int(said["episode_index"])] = int(said["length"])
@@ -110,7 +110,7 @@ def _version_2(root: Path, info: DatasetInfo, videos: Sequence[str]) -> dict[int
 
 
 def _chunks_size(root: Path) -> int:
-    size = int(json.loads(read_file(root / INFO_FILE, INFO_FILE)).get("chunks_size", 1000))
+    size = int(json.loads(read_file(f"{root}/{INFO_FILE}", INFO_FILE)).get("chunks_size", 1000))
     if size < 1:
         raise ValueError(f"chunks_size must be at least 1, found {size}")
     return size
