@@ -78,8 +78,8 @@ def main() -> None:
         "# Frames per second of LeRobot videos",
         "",
         f"{FRAMES} generated frames of {WIDTH}x{HEIGHT}, a key frame every other one, decoded to RGB; processor time, "
-        f"medians of {ROUNDS} rounds side by side. Ours digests the stored bytes in a pass of its own, finds each frame "
-        "by its time and compares it with the limits; PyAV alone decodes and converts. The goal is a ratio of 0.8.",
+        f"medians of {ROUNDS} rounds side by side. Ours digests the stored bytes in a pass of its own, finds frames by "
+        "their times and compares them with the limits; PyAV alone decodes and converts. The goal is a ratio of 0.8.",
         "",
         *table(["codec", "PyAV alone, frames/s", "reader, frames/s", "ratio"], rows),
         "",
