@@ -1,6 +1,7 @@
 """Ranks of a training run are killed and resumed, also on another number of ranks; the ledger proves what was seen."""
 
 import json
+import os
 import secrets
 import signal
 import subprocess
@@ -16,7 +17,6 @@ from wsm_data.loaders.ledger.sources import open_recorded_sources
 from wsm_data.loaders.ledger.timeline import read_timeline
 
 PROGRAM = Path(__file__).parent / "fakes" / "train_rank.py"
-WAIT_S = 120  # far beyond any start on a busy machine: what takes longer hangs
 CLIPS, STEPS = 39, 10  # in steps of four, the last one with a repeated clip
 
 
@@ -35,25 +35,34 @@ def run(tmp_path, tiny, make_clip):
     }
 
 
-def session(run, tmp_path, world_size, *, victim=-1, killed_at=None, **changes):
-    """All ranks at once, each slower than the one before; returns how each of them ended."""
-    group = tmp_path / secrets.token_hex(8)
-    processes = []
-    for rank in range(world_size):
-        settings = run | changes | {"group": str(group), "rank": rank, "world_size": world_size}
-        settings |= {"pause_s": 0.01 * rank, "killed_at": killed_at if rank == victim else None}
-        processes.append(subprocess.Popen([sys.executable, str(PROGRAM), json.dumps(settings)], stderr=subprocess.PIPE))
-    try:
-        errors = [process.communicate(timeout=WAIT_S)[1].decode() for process in processes]
-    finally:
-        for process in processes:
-            process.kill()
-            process.wait()
-    codes = [process.returncode for process in processes]
-    assert codes[victim] == -signal.SIGKILL or killed_at is None, errors
-    assert killed_at is None or all(code != 0 for code in codes), "no rank may go on without the others"
-    assert killed_at is not None or codes == [0] * world_size, errors
-    return codes
+@pytest.fixture(scope="module")
+def server():
+    """Starts ranks without importing torch for each anew."""
+    command = [sys.executable, str(PROGRAM)]
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True, text=True
+    ) as process:
+        yield process
+        os.killpg(process.pid, signal.SIGKILL)
+
+
+@pytest.fixture
+def session(run, server, tmp_path):
+    """Runs all ranks at once, each slower than the one before, one of them perhaps to a sudden end."""
+
+    def start(world_size, *, victim=-1, killed_at=None, **changes):
+        group = str(tmp_path / secrets.token_hex(8))
+        ranks = [run | changes | {"group": group, "rank": rank, "world_size": world_size} for rank in range(world_size)]
+        for rank, settings in enumerate(ranks):
+            settings |= {"pause_s": 0.01 * rank, "killed_at": killed_at if rank == victim else None}
+        server.stdin.write(json.dumps(ranks) + "\n")
+        server.stdin.flush()
+        codes = json.loads(server.stdout.readline())
+        assert codes[victim] == -signal.SIGKILL or killed_at is None
+        assert killed_at is None or all(code != 0 for code in codes), "no rank may go on without the others"
+        assert killed_at is not None or codes == [0] * world_size
+
+    return start
 
 
 def prove(run):
@@ -64,11 +73,11 @@ def prove(run):
     return timeline, audits
 
 
-def test_killed_ranks_are_resumed_on_any_world_size_and_nothing_is_lost_or_seen_twice(run, tmp_path, capsys):
-    session(run, tmp_path, 2, victim=1, killed_at=[0, 7])
-    session(run, tmp_path, 2, victim=0, killed_at=[1, 4], killed_before_the_step=False)
-    session(run, tmp_path, 4, victim=3, killed_at=[1, 8])
-    session(run, tmp_path, 1)
+def test_killed_ranks_are_resumed_on_any_world_size_and_nothing_is_lost_or_seen_twice(run, session, capsys):
+    session(2, victim=1, killed_at=[0, 7])
+    session(2, victim=0, killed_at=[1, 4], killed_before_the_step=False)
+    session(4, victim=3, killed_at=[1, 8])
+    session(1)
     timeline, audits = prove(run)
     assert sorted({file.world_size for file in timeline.files}) == [1, 2, 4]
     assert [(audit.complete, audit.seen_once, audit.seen_more, audit.never) for audit in audits] == [
@@ -80,25 +89,25 @@ def test_killed_ranks_are_resumed_on_any_world_size_and_nothing_is_lost_or_seen_
     assert capsys.readouterr().out.splitlines()[-1].startswith("2 of 2 epochs complete, no step missing, none twice")
 
 
-def test_a_resume_from_beyond_what_was_trained_is_found_out(run, tmp_path):
-    session(run, tmp_path, 1, victim=0, killed_at=[0, 4])
+def test_a_resume_from_beyond_what_was_trained_is_found_out(run, session):
+    session(1, victim=0, killed_at=[0, 4])
     checkpoint = Path(run["checkpoint"])
     state = json.loads(checkpoint.read_text())
     checkpoint.write_text(json.dumps(state | {"step": 7}))
-    session(run, tmp_path, 1)
+    session(1)
     with pytest.raises(IntegrityError, match="epoch 0: steps 5 to 6 in no session"):
         audit_run(Path(run["ledger"]), [run["release"]], [], None, None, None)
 
 
 @pytest.mark.slow
-def test_killed_twenty_times_a_run_has_seen_every_clip_as_if_undisturbed(run, tmp_path, faults):
+def test_killed_twenty_times_a_run_has_seen_every_clip_as_if_undisturbed(run, session, faults):
     run |= {"epochs": 10}
     for kill in range(20):  # twice an epoch, before and after the step is recorded, alone and as one of two
         world_size = 1 + kill % 2
         before = kill % 3 == 0
         at = [kill // 2, 4 + 4 * (kill % 2)]
-        session(run, tmp_path, world_size, victim=world_size - 1, killed_at=at, killed_before_the_step=before)
+        session(world_size, victim=world_size - 1, killed_at=at, killed_before_the_step=before)
         faults["kills of trainings"] += 1
-    session(run, tmp_path, 1)
+    session(1)
     _, audits = prove(run)
     assert [(audit.complete, audit.never) for audit in audits] == [(True, 0)] * 10

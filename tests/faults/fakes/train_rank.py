@@ -1,8 +1,9 @@
-"""One rank of a training run: batches, a collective each step, a checkpoint by rank 0, and maybe a sudden end.
+"""Ranks of a training run: batches, a collective each step, a checkpoint by rank 0, and maybe a sudden end of one.
 
-Usage: train_rank.py SETTINGS, as JSON: release, ledger, checkpoint, group (file of the process group), rank,
-world_size, epochs, pause_s (of each step), checkpoint_every (steps), killed_at ([epoch, step] or null),
-killed_before_the_step.
+Each line of standard input is a JSON list of what each rank is to do. They are forked from this process, where all is
+imported, and it answers with a list of their exit codes. A rank is told: release, ledger, checkpoint, group (file of
+the process group), rank, world_size, epochs, pause_s (of each step), checkpoint_every (steps), killed_at ([epoch, step]
+or null), killed_before_the_step.
 """
 
 import json
@@ -64,5 +65,18 @@ def step(settings, batch):
         os.kill(os.getpid(), signal.SIGKILL)
 
 
+def start(settings):
+    """The process id of a rank."""
+    child = os.fork()
+    if not child:
+        train(settings)
+        sys.exit()
+    return child
+
+
 if __name__ == "__main__":
-    train(json.loads(sys.argv[1]))
+    for line in sys.stdin:
+        ranks = [start(settings) for settings in json.loads(line)]
+        codes = [os.waitstatus_to_exitcode(os.waitpid(rank, 0)[1]) for rank in ranks]
+        sys.stdout.write(json.dumps(codes) + "\n")
+        sys.stdout.flush()
