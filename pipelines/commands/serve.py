@@ -26,7 +26,7 @@ def serve(
     """Serve until Ctrl-C or SIGTERM."""
     from pipelines.operations import serve as operation
 
-    operation.serve(operation.served_planner(planner, model, codec_weights), client, host, port)
+    operation.serve(operation.served_planner(planner, model, codec_weights, client), client, host, port)
 
 
 COMMAND = Command(name="serve", summary="Serve a planner over the public HTTP protocol.", call=serve)

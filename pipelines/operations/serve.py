@@ -7,15 +7,15 @@ import typer
 from wsm_data.errors import ConfigError
 from wsm_data.planners.http.goal_client import GoalClient
 from wsm_data.planners.http.server import PlannerServer, ServerConfig
-from wsm_data.planners.http.service import PlannerService, require_servable
+from wsm_data.planners.http.service import GOAL_FRAMES, PlannerService, require_servable
 from wsm_data.planners.planner import Planner
 from wsm_data.planners.registry import PlannerConfig, make_planner
 
 AGENT = "agent"
 
 
-def served_planner(name: str, model: Path | None, codec_weights: str) -> Planner:
-    """The planner of a name; the agent is the only one that has a model.
+def served_planner(name: str, model: Path | None, codec_weights: str, client: GoalClient) -> Planner:
+    """The planner of a name for such clients; the agent is the only one that has a model.
 
     Raises:
         ConfigError: there is no such planner or model, one is missing or of no use, or the model is of another codec.
@@ -24,7 +24,7 @@ def served_planner(name: str, model: Path | None, codec_weights: str) -> Planner
     if (name == AGENT) != (model is not None):
         raise ConfigError(f"--model FOLDER belongs to --planner {AGENT}, found planner {name} and model {model}")
     if model is None:
-        return make_planner(name, PlannerConfig())
+        return make_planner(name, PlannerConfig(goal=GOAL_FRAMES[client]))
     from wsm_model.agent.config import AgentConfig
     from wsm_model.agent.load import load_agent
 
@@ -41,9 +41,9 @@ def serve(planner: Planner, client: GoalClient, host: str, port: int) -> None:
         port: 0 for any that is free; the first line that is printed says which.
 
     Raises:
-        ConfigError: it cannot be served to such clients, or the address cannot be had.
+        ConfigError: it needs what the protocol does not bring, or the address cannot be had.
     """
-    require_servable(planner, client)
+    require_servable(planner)
     try:
         server = PlannerServer(PlannerService(planner, client), ServerConfig(host=host, port=port))
     except OSError as error:

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from wsm_data.geometry.planar import points_in_base
+from wsm_data.geometry.planar import points_from_base, points_in_base
 from wsm_data.planners.costs import Caution, prices
 from wsm_data.planners.depth_odometry import DepthOdometry
 from wsm_data.planners.depth_scan import DepthScan, ScanConfig, scan_depth
@@ -43,14 +43,14 @@ class MapAndPlan:
         """Answer to one observation; where the map shows no way, with a turn that shows more of it.
 
         Raises:
-            ValueError: there is no depth, or the goal is not given in the start frame.
+            ValueError: there is no depth.
         """
-        if observation.depth_m is None or observation.goal_frame != GoalFrame.START:
-            raise ValueError("map-and-plan needs depth, and its goal in the start frame")
+        if observation.depth_m is None:
+            raise ValueError("map-and-plan needs depth")
         scan = scan_depth(observation.depth_m, self._intrinsics, self._scan)
         here = self._localise(observation, scan)
         self._map.add(scan, here)
-        goal = observation.goal_xy_m
+        goal = _goal_in_start(observation, here)
         grid = self._map.grid(np.stack([here[:2], goal]))
         way = find_route(grid, prices(grid, self._radius_m, _CAUTION, through_unknown=True), here[:2], goal)
         free_m = free_corridor_m(grid, here, self._radius_m)
@@ -60,6 +60,13 @@ class MapAndPlan:
             goal_estimate_m=np.append(points_in_base(goal[None], here)[0], 0.0),
             pose_estimate=here,
         )
+
+
+def _goal_in_start(observation: Observation, here: Float64Array) -> Float64Array:
+    """The goal in the frame of the map: as given, or, where it is given anew each time, by where the robot is."""
+    if observation.goal_frame is GoalFrame.START:
+        return observation.goal_xy_m
+    return points_from_base(observation.goal_xy_m[None], here)[0]
 
 
 def true_pose(observation: Observation, scan: DepthScan) -> Float64Array:  # noqa: ARG001

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 from wsm_data.errors import ConfigError
 from wsm_data.files.digest import sha256_file
 from wsm_data.files.json_values import to_json
-from wsm_data.planners.planner import GoalFrame
 from wsm_data.planners.registry import PLANNER_NAMES
 from wsm_data.sim.config import SimConfig
 
@@ -16,7 +15,6 @@ if TYPE_CHECKING:  # built-in planners are evaluated without torch
 
 AGENT = "agent"
 _SAY_THEIR_POSE = ("map-and-plan", "map-and-plan-estimated", AGENT)
-_FIXED_GOAL_ALONE = ("map-and-plan", "map-and-plan-estimated")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,8 +53,6 @@ class NavConfig:
                 "--controller-pose estimated needs a planner that says where it believes to be "
                 f"({', '.join(_SAY_THEIR_POSE)}), found {self.planner}"
             )
-        if self.sim.goal == GoalFrame.CURRENT and self.planner in _FIXED_GOAL_ALONE:
-            raise ConfigError(f"{self.planner} plans in the start frame: it needs --goal fixed")
 
 
 def is_url(planner: str) -> bool:

@@ -31,7 +31,7 @@ def open_planner(config: NavConfig, watcher: "Watcher | None" = None) -> Planner
         return agent
     if is_url(config.planner):
         return HttpPlanner(config.planner, ClientConfig())
-    return make_planner(config.planner, PlannerConfig(robot=config.sim.robot))
+    return make_planner(config.planner, PlannerConfig(robot=config.sim.robot, goal=config.sim.goal))
 
 
 @lru_cache(maxsize=1)

@@ -35,6 +35,7 @@ def test_a_served_planner_answers_and_ends_in_order(number):
     [
         (["--planner", "oracle", "--port", "0"], "needs the map"),
         (["--planner", "reactive", "--port", "0"], "point-goal clients"),
+        (["--planner", "map-and-plan", "--client", "point-goal", "--port", "0"], "needs its true pose"),
         (["--planner", "nobody", "--port", "0"], "must be one of"),
         (["--planner", "agent", "--port", "0"], "--model FOLDER belongs to --planner agent"),
         (["--planner", "reactive", "--model", "m", "--port", "0"], "--model FOLDER belongs to --planner agent"),

@@ -1,6 +1,9 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from wsm_data.geometry.planar import points_in_base
 from wsm_data.planners.depth_scan import ScanConfig
 from wsm_data.planners.map_and_plan import MapAndPlan, estimated_pose, true_pose
 from wsm_data.planners.planner import GoalFrame, Observation
@@ -37,7 +40,10 @@ def test_estimating_its_pose_it_needs_none(camera, look_at):
         MapAndPlan(camera, 0.25, ScanConfig(), true_pose).plan(unaided)
 
 
-def test_a_goal_that_moves_with_the_robot_is_refused(camera, look_at):
-    moving = Observation(step=0, goal_xy_m=np.ones(2), goal_frame=GoalFrame.CURRENT, depth_m=look_at(4.0))
-    with pytest.raises(ValueError, match="in the start frame"):
-        MapAndPlan(camera, 0.25, ScanConfig(), true_pose).plan(moving)
+def test_a_goal_that_is_given_anew_is_the_same_goal_where_the_pose_puts_it(camera, look_at):
+    pose = np.array([1.0, 0.5, 0.3])
+    fixed = observe(look_at(4.0), (3.0, 0.5), pose)
+    anew = replace(fixed, goal_xy_m=points_in_base(fixed.goal_xy_m[None], pose)[0], goal_frame=GoalFrame.CURRENT)
+    plans = [MapAndPlan(camera, 0.25, ScanConfig(), true_pose).plan(one) for one in (fixed, anew)]
+    np.testing.assert_allclose(plans[1].path_m, plans[0].path_m, atol=1e-9)
+    np.testing.assert_allclose(plans[1].goal_estimate_m[:2], anew.goal_xy_m, atol=1e-9)

@@ -20,8 +20,8 @@ from wsm_data.schema.camera import Intrinsics
 _MOST_ENVIRONMENTS = 256
 _FARTHEST_M = np.float32(FARTHEST_CODE / 10000)
 
-
-_FRAMES = {GoalClient.START_GOAL: GoalFrame.START, GoalClient.POINT_GOAL: GoalFrame.CURRENT}
+GOAL_FRAMES = {GoalClient.START_GOAL: GoalFrame.START, GoalClient.POINT_GOAL: GoalFrame.CURRENT}
+"""The frame of each client's goals."""
 
 
 @dataclass(kw_only=True)
@@ -105,7 +105,7 @@ class PlannerService:
             number: Observation(
                 step=self._environments[number].step,
                 goal_xy_m=goals[number],
-                goal_frame=_FRAMES[self.client],
+                goal_frame=GOAL_FRAMES[self.client],
                 rgb_u8=rgb[number] if Sense.RGB in self.planner.senses else None,
                 depth_m=depth[number] if Sense.DEPTH in self.planner.senses else None,
             )
@@ -160,20 +160,20 @@ class PlannerService:
         return json.dumps({"algo": self.planner.name}).encode()
 
 
-def require_servable(planner: Planner, client: GoalClient) -> None:
-    """Check that a planner can do with what the protocol brings: pictures, depth, and such a client's goals.
+def require_servable(planner: Planner) -> None:
+    """Check that a planner can do with what the protocol brings: pictures, depth and goals.
 
     Raises:
-        ConfigError: it needs the map, or its true pose; that is missed by none whose goal is in the current frame.
+        ConfigError: it needs the map, or its true pose.
     """
     if Sense.MAP in planner.senses:
         raise ConfigError(
             f"{planner.name} needs the map of the scene, which the protocol does not bring; serve another planner"
         )
-    if Sense.POSE in planner.senses and client is GoalClient.START_GOAL:
+    if Sense.POSE in planner.senses:
         raise ConfigError(
-            f"{planner.name} needs its true pose to know where a goal of the start frame is, and the protocol does not "
-            f"bring it; serve it to {GoalClient.POINT_GOAL} clients"
+            f"{planner.name} needs its true pose, which the protocol does not bring; serve a planner that estimates it, "
+            f"or, to {GoalClient.POINT_GOAL} clients, one that needs it for goals of the start frame alone"
         )
 
 

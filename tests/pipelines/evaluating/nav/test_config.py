@@ -2,7 +2,6 @@ import pytest
 
 from pipelines.evaluating.nav.config import NavConfig, fixed_settings
 from wsm_data.errors import ConfigError
-from wsm_data.planners.planner import GoalFrame
 from wsm_data.sim.config import SimConfig
 
 
@@ -13,7 +12,6 @@ from wsm_data.sim.config import SimConfig
         ({"planner": "agent"}, "--model belongs to --planner agent"),
         ({"planner": "oracle", "model": "x"}, "--model belongs to --planner agent"),
         ({"planner": "reactive", "sim": SimConfig(estimated_controller_pose=True)}, "says where it believes to be"),
-        ({"planner": "map-and-plan", "sim": SimConfig(goal=GoalFrame.CURRENT)}, "needs --goal fixed"),
     ],
 )
 def test_what_does_not_go_together_is_refused_before_any_work(settings, message):

@@ -8,10 +8,10 @@ import pytest
 from wsm_data.errors import ConfigError
 from wsm_data.planners.http.fault import Fault, WireError
 from wsm_data.planners.http.goal_client import GoalClient
-from wsm_data.planners.http.service import PlannerService, require_servable
+from wsm_data.planners.http.service import GOAL_FRAMES, PlannerService, require_servable
 from wsm_data.planners.http.wire import encode_depth, encode_goals, encode_image
 from wsm_data.planners.planner import GoalFrame, Plan, Sense
-from wsm_data.planners.registry import PlannerConfig, make_planner
+from wsm_data.planners.registry import PLANNER_NAMES, PlannerConfig, make_planner
 
 MATRIX = [[30.0, 0, 16.0], [0, 30.0, 8.0], [0, 0, 1]]
 
@@ -161,16 +161,30 @@ def test_a_matrix_that_does_not_fit_the_picture_is_named(recording, form):
     assert fault_of(lambda: service.point_goal_step(form())) is Fault.PLANNER
 
 
-def test_which_built_in_planners_can_be_served_to_whom():
-    names = ("oracle", "straight-line", "reactive", "map-and-plan-estimated")
+@pytest.mark.parametrize(
+    ("name", "client"),
+    [(name, GoalClient.POINT_GOAL) for name in ("straight-line", "reactive", "map-and-plan-estimated")]
+    + [("map-and-plan-estimated", GoalClient.START_GOAL)],
+)
+def test_each_planner_that_is_served_answers_step_after_step(form, name, client):
+    """Nothing is seen within 5 m, and the goal lies 0.32 rad to the right: the answer is a path that leads there."""
+    planner = make_planner(name, PlannerConfig(goal=GOAL_FRAMES[client]))
+    require_servable(planner)
+    service = started(planner, client)
+    for _ in range(2):
+        path = np.array(json.loads(service.point_goal_step(form(depth_m=np.inf)))["trajectory"][0])
+    assert path[-1, 0] > 1.0
+    assert path[-1, 1] / path[-1, 0] == pytest.approx(-1 / 3, abs=0.02)
 
+
+def test_which_built_in_planners_can_be_served_to_whom():
     def is_servable(name, client):
         try:
-            require_servable(make_planner(name, PlannerConfig()), client)
+            require_servable(make_planner(name, PlannerConfig(goal=GOAL_FRAMES[client])))
         except ConfigError:
             return False
         return True
 
-    servable = {client: [name for name in names if is_servable(name, client)] for client in GoalClient}
+    servable = {client: [name for name in PLANNER_NAMES if is_servable(name, client)] for client in GoalClient}
     assert servable[GoalClient.START_GOAL] == ["map-and-plan-estimated"]
     assert servable[GoalClient.POINT_GOAL] == ["straight-line", "reactive", "map-and-plan-estimated"]
