@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from wsm_data.geometry.planar import points_in_base
 from wsm_data.planners.depth_odometry import DepthOdometry, outline
 from wsm_data.planners.depth_scan import DepthScan
 
@@ -11,11 +12,11 @@ WALLS = [  # segments of a room with a niche, m
 ]  # fmt: skip
 
 
-def scan_from(pose):
+def scan_from(pose, walls=WALLS):
     slopes = np.linspace(0.67, -0.67, 160)
     heading, free = pose[2], np.full(160, np.inf)
     forward, left = np.array([np.cos(heading), np.sin(heading)]), np.array([-np.sin(heading), np.cos(heading)])
-    for a, b in np.array(WALLS, float):
+    for a, b in np.array(walls, float):
         for k, slope in enumerate(slopes):
             ray = forward + slope * left
             matrix = np.column_stack([ray, a - b])
@@ -49,6 +50,18 @@ def test_a_drive_with_turns_is_followed_within_two_centimetres():
         pose = pose + np.array([0.03 * np.cos(pose[2]), 0.03 * np.sin(pose[2]), turn])
     assert np.linalg.norm(pose[:2] - start[:2]) > 1.5
     assert worst < 0.02
+
+
+def test_turning_before_a_bare_wall_after_a_drive_the_estimate_stays():
+    """Scans say nothing along the wall, and the motion until then ran along it: only that wheels do not slip holds it."""
+    odometry, pose = DepthOdometry(), np.array([-2.0, -0.5, -0.6])
+    start = pose.copy()
+    for step in range(24):
+        odometry.add(scan_from(pose, walls=[((-9, -2), (9, -2))]))
+        moved = 0.06 * np.array([np.cos(pose[2]), np.sin(pose[2]), 0.0])
+        pose = pose + (moved if step < 12 else np.array([0.0, 0.0, 0.05]))
+    true = points_in_base(pose[None, :2], start)[0]
+    assert np.linalg.norm(odometry.add(scan_from(pose, walls=[((-9, -2), (9, -2))]))[:2] - true) < 0.03
 
 
 def test_the_first_scan_is_the_origin_and_a_blind_one_continues_the_motion():

@@ -172,8 +172,8 @@ def require_servable(planner: Planner) -> None:
         )
     if Sense.POSE in planner.senses:
         raise ConfigError(
-            f"{planner.name} needs its true pose, which the protocol does not bring; serve a planner that estimates it, "
-            f"or, to {GoalClient.POINT_GOAL} clients, one that needs it for goals of the start frame alone"
+            f"{planner.name} needs its true pose, which the protocol does not bring; serve a planner that estimates "
+            f"it, or, to {GoalClient.POINT_GOAL} clients, one that needs it for goals of the start frame alone"
         )
 
 
