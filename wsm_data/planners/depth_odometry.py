@@ -15,8 +15,8 @@ _POINT_SIGMA_M = 0.02
 _MOTION_SIGMA = np.array([0.02, 0.003, 0.03])
 """How far a motion may differ from the expected one: along its chord, across it (m), in heading (rad).
 
-A base on two wheels never slips sideways. That is what holds the estimate where the robot turns before a bare wall, along
-which scans say nothing.
+A base on two wheels never slips sideways. That is what holds the estimate where the robot turns before a bare wall,
+along which scans say nothing.
 """
 
 _KEYFRAMES = 12

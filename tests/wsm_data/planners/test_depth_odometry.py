@@ -53,7 +53,7 @@ def test_a_drive_with_turns_is_followed_within_two_centimetres():
 
 
 def test_turning_before_a_bare_wall_after_a_drive_the_estimate_stays():
-    """Scans say nothing along the wall, and the motion until then ran along it: only that wheels do not slip holds it."""
+    """Scans say nothing along the wall, and the motion until then ran along it; that wheels do not slip holds it."""
     odometry, pose = DepthOdometry(), np.array([-2.0, -0.5, -0.6])
     start = pose.copy()
     for step in range(24):
