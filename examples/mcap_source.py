@@ -1,8 +1,8 @@
 """An MCAP recording as a source: `python examples/mcap_source.py RECORDING.mcap SOURCE SCENE EPISODE`.
 
 It reads JSON messages in Foxglove's schemas: CompressedImage (colour), RawImage of `16UC1` (depth in mm), PoseInFrame
-(camera in a world with z up, OpenCV axes) and CameraCalibration. For a ROS 2 bag give `make_reader` the `DecoderFactory`
-of the package mcap-ros2-support in place of `JsonDecoder`, and read the fields of sensor_msgs and geometry_msgs. Needs
+(camera in a world with z up, OpenCV axes) and CameraCalibration. For a ROS 2 bag give `make_reader` the
+`DecoderFactory` of the package mcap-ros2-support in place of `JsonDecoder`, and read the fields of sensor_msgs and geometry_msgs. Needs
 the package mcap.
 """
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TextIO
 
-from pipelines.running.stage import require_inside
 from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.files.atomic import is_full_disk, write_text
 from wsm_data.files.digest import xxh3_128_file
@@ -34,7 +33,8 @@ class StageRecord:
         workers: worker processes of the last run.
         finished: digest of the outcomes `finish` was last called with; empty before.
         outputs: xxh3_128 of every file that `finish` and the runner wrote at the end, by its name relative to the
-            folder; None for a folder.
+            folder; None for a folder. One may lie beside the folder, as the scores that are installed in a release do:
+            these files are compared, and never deleted.
     """
 
     name: str
@@ -48,9 +48,6 @@ class StageRecord:
     workers: int = 1
     finished: str = ""
     outputs: Mapping[str, str | None] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        require_inside(self.outputs)
 
 
 def read_stage_record(folder: Path) -> StageRecord | None:

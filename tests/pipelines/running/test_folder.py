@@ -40,8 +40,8 @@ def test_a_record_that_cannot_be_read_is_damage(tmp_path, text):
         read_stage_record(tmp_path)
 
 
-@pytest.mark.parametrize("change", [{"version": "3"}, {"outputs": {"../kept": None}}, {"inputs": {"index": 1}}])
-def test_a_record_of_other_types_or_of_files_outside_the_folder_is_damage(tmp_path, change):
+@pytest.mark.parametrize("change", [{"version": "3"}, {"outputs": {"kept": 1}}, {"inputs": {"index": 1}}])
+def test_a_record_of_other_types_is_damage(tmp_path, change):
     write_text(tmp_path / "stage.json", json.dumps(sealed(vars(RECORD) | change)))
     with pytest.raises(IntegrityError, match=f"is not a stage record .*{next(iter(change))}"):
         read_stage_record(tmp_path)
