@@ -2,8 +2,8 @@
 
 It reads JSON messages in Foxglove's schemas: CompressedImage (colour), RawImage of `16UC1` (depth in mm), PoseInFrame
 (camera in a world with z up, OpenCV axes) and CameraCalibration. For a ROS 2 bag give `make_reader` the
-`DecoderFactory` of the package mcap-ros2-support in place of `JsonDecoder`, and read the fields of sensor_msgs and geometry_msgs. Needs
-the package mcap.
+`DecoderFactory` of the package mcap-ros2-support in place of `JsonDecoder`, and read the fields of sensor_msgs and
+geometry_msgs. Needs the package mcap.
 """
 
 import base64
