@@ -24,8 +24,13 @@ class Precision(StrEnum):
 
 
 def autocast(precision: Precision, device: torch.device) -> torch.autocast:
-    """Matrix products in this precision."""
-    return torch.autocast(device.type, torch.bfloat16, enabled=precision is Precision.BFLOAT16)
+    """Matrix products in this precision.
+
+    Rounded weights are not cached: each is used once in a pass, and a cache would hold a copy of the whole model where
+    layers are recomputed or sharded.
+    """
+    is_rounded = precision is Precision.BFLOAT16
+    return torch.autocast(device.type, torch.bfloat16, enabled=is_rounded, cache_enabled=False)
 
 
 def stored_precision(model: nn.Module) -> Precision:

@@ -15,18 +15,24 @@ def train(
     release: Annotated[
         str | None, typer.Argument(metavar="[RELEASE]", help="Release to train on, unless the settings name sources.")
     ] = None,
-    config: Annotated[Path | None, typer.Option("--config", "-c", help="TOML of differences to the defaults.")] = None,
+    config: Annotated[
+        Path | None,
+        typer.Option("--config", "-c", help="TOML of differences to the defaults, or a packaged one: wsm5b_8x80gb."),
+    ] = None,
     assignments: Annotated[
         list[str] | None, typer.Option("--set", "-s", help="One setting: section.key=value. Repeatable.")
     ] = None,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Show settings and sizes; write nothing.")] = False,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Show settings, and memory, time and sizes by calculation; write nothing.")
+    ] = False,
+    anyway: Annotated[bool, typer.Option("--anyway", help="Of a dry run: do not refuse what cannot fit.")] = False,
     quiet: Quiet = False,
 ) -> None:
     """Train in a folder."""
     require_extra("train", ("safetensors", "tensorboard"))
     from pipelines.operations import train as operation
 
-    operation.train(release, out, config, assignments or [], dry_run, quiet)
+    operation.train(release, out, config, assignments or [], dry_run, anyway, quiet)
 
 
 COMMAND = Command(

@@ -6,6 +6,7 @@ from wsm_data.loaders.config import OrderConfig, ReadConfig, SourceConfig
 from wsm_model.config import Variant
 from wsm_model.inference.session import SessionConfig
 from wsm_model.model import Attention
+from wsm_model.training.budget import HardwareConfig
 from wsm_model.training.config import TrainingConfig
 
 
@@ -66,6 +67,7 @@ class TrainRunConfig:
         model: which model.
         training: optimiser, losses, checkpoints.
         held_out: what is measured on other clips.
+        hardware: what `--dry-run` plans for.
         codec_weights: folder of the weights of the release's codec, where it has any; only for pictures.
     """
 
@@ -75,6 +77,7 @@ class TrainRunConfig:
     model: ModelChoice = field(default_factory=ModelChoice)
     training: TrainingConfig = field(default_factory=TrainingConfig)
     held_out: HeldOutConfig = field(default_factory=HeldOutConfig)
+    hardware: HardwareConfig = field(default_factory=HardwareConfig)
     codec_weights: str = ""
 
     def __post_init__(self) -> None:

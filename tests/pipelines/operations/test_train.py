@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -103,7 +104,29 @@ def test_a_dry_run_says_sizes_and_writes_nothing(release, settings, tmp_path):
     assert code == 0, text
     assert "steps: 3" in text
     assert "model: tiny, 6 layers" in text
+    assert "moments of AdamW" in text
+    assert re.search(r"a step: .* TFLOP, .* s at 35% of 8 x 989 TFLOP/s", text)
     assert not out.exists()
+
+
+def test_a_dry_run_refuses_what_cannot_fit_unless_it_is_told_to_print_it_anyway(release, settings, tmp_path):
+    """16 bytes a parameter of 5.7 million on one GPU are 0.09 GiB, the reserve is left out, and 0.05 GiB are given."""
+    small = ("-s", "hardware.gpus=1", "-s", "hardware.memory_gib=0.05", "-s", "hardware.reserve_gib=0.0")
+    words = ("train", release, "--out", str(tmp_path / "run"), "-c", settings, "--dry-run", *small)
+    code, text = wsm(*words)
+    assert code == 2, text
+    assert "a GPU of 0.05 GiB" in text
+    assert wsm(*words, "--anyway")[0] == 0
+
+
+def test_settings_may_be_a_packaged_recipe_and_a_name_that_is_none_lists_them(release, tmp_path):
+    words = ("train", release, "--out", str(tmp_path / "run"), "--dry-run", "-s", "order.global_batch=2")
+    code, text = wsm(*words, "-c", "small_1x24gb")
+    assert code == 0, text
+    assert "of 23.5" in text
+    code, text = wsm(*words, "-c", "small_2x24gb")
+    assert code == 2
+    assert "or one of small_1x24gb, wsm5b_48x80gb, wsm5b_8x80gb" in text
 
 
 @pytest.mark.parametrize(
