@@ -34,6 +34,7 @@ class HeldOutConfig:
     Attributes:
         split: split of those clips.
         clips: clips that are evaluated after the last step; 0: none.
+        sampled_clips: clips that are measured with every picture, for the curves; the first of them is drawn.
         max_latents: they are cut to prefixes of this length; 0: whole clips.
         flow_steps: sampler steps of a dream (paper: 8).
         session: chunk size, cache and backend of the streaming estimation.
@@ -41,14 +42,16 @@ class HeldOutConfig:
 
     split: str = "test"
     clips: int = 16
+    sampled_clips: int = 4
     max_latents: int = 0
     flow_steps: int = 8
     session: SessionConfig = field(default_factory=SessionConfig)
 
     def __post_init__(self) -> None:
-        if self.clips < 0 or self.flow_steps < 1:
+        if self.clips < 0 or self.flow_steps < 1 or self.sampled_clips < 1:
             raise ValueError(
-                f"clips must not be negative and flow_steps be at least 1, found {self.clips} and {self.flow_steps}"
+                "clips must not be negative, flow_steps and sampled_clips be at least 1, found "
+                f"{self.clips}, {self.flow_steps} and {self.sampled_clips}"
             )
         if self.max_latents < 0 or self.max_latents == 1:
             raise ValueError(

@@ -3,7 +3,7 @@
 import dataclasses
 import json
 import logging
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ from tqdm import tqdm
 
 from pipelines.training.config import HeldOutConfig
 from wsm_data.files.atomic import write_text
+from wsm_data.loaders.batches.batch import Batch
 from wsm_data.loaders.loader import ClipLoader
 from wsm_data.view.drawing.text_table import aligned
 from wsm_model.evaluation.baselines import fit_baselines
@@ -52,6 +53,23 @@ def evaluate(
     if clips < config.clips:
         _LOG.warning("%d held-out clips were asked for, the split %s has %d", config.clips, config.split, clips)
     batches = list(islice(loader, clips))
+    errors = held_out_errors(model, batches, config, decoding=decoding, shift=shift, quiet=quiet)
+    means, flow = summarise(errors), flow_matching_errors(model, batches, seed=0, shift=shift)
+    record = {**means, "flow": dataclasses.asdict(flow), "clips": [dataclasses.asdict(one) for one in errors]}
+    write_text(path, json.dumps(record, indent=1) + "\n")
+    return evaluation_table(means, flow, len(batches))
+
+
+def held_out_errors(
+    model: WorldSlamModel,
+    batches: Sequence[Batch],
+    config: HeldOutConfig,
+    *,
+    decoding: Decoding,
+    shift: float,
+    quiet: bool,
+) -> list[ClipErrors]:
+    """Errors of a model on clips, beside guesses that are fitted to those clips; arguments as in `evaluate`."""
     settings = HeldOutSettings(
         session=config.session,
         schedule=flow_schedule(config.flow_steps, shift),
@@ -61,10 +79,17 @@ def evaluate(
     errors: list[ClipErrors] = []
     for batch in tqdm(batches, unit="clip", desc="evaluate", disable=quiet):
         errors += clip_errors(model, batch, settings)
-    means, flow = summarise(errors), flow_matching_errors(model, batches, seed=0, shift=shift)
-    record = {**means, "flow": dataclasses.asdict(flow), "clips": [dataclasses.asdict(one) for one in errors]}
-    write_text(path, json.dumps(record, indent=1) + "\n")
-    return evaluation_table(means, flow, len(batches))
+    return errors
+
+
+def curve_values(means: Mapping[str, object]) -> dict[str, float]:
+    """Means as numbers of a curve: those of +1, +2, ... latents each by a name of their own, unknown ones left out."""
+    found: dict[str, float] = {}
+    for name, value in means.items():
+        parts = {f"{name}_{ahead + 1}": one for ahead, one in enumerate(value)} if isinstance(value, list) else {}
+        known = {key: one for key, one in (parts or {name: value}).items() if isinstance(one, float)}
+        found |= {f"held_out_{key}": one for key, one in known.items()}
+    return found
 
 
 def evaluation_table(means: Mapping[str, Any], flow: FlowErrors, clips: int) -> str:

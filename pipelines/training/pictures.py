@@ -25,6 +25,11 @@ CURVE_UNITS = {
     "pose_absolute": "smooth L1 (m and 1)",
     "pose_relative": "smooth L1 (m and 1)",
     "learning_rate": "base learning rate (1)",
+    "held_out_depth_abs_rel": "mean relative depth error (1)",
+    "held_out_depth_delta1": "share of pixels within 1.25 (1)",
+    "held_out_ate_rmse_unaligned_m": "camera error, not aligned (m)",
+    "held_out_dream_psnr_db_1": "PSNR of a dream at +1 latent (dB)",
+    "held_out_dream_psnr_db_4": "PSNR of a dream at +4 latents (dB)",
 }
 _FRAMES_SHOWN = 5
 

@@ -16,6 +16,7 @@ import json
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from functools import partial
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +28,7 @@ from pipelines.running.full_disk import full_disk_named
 from pipelines.running.interrupts import termination_noted
 from pipelines.training.config import TrainRunConfig
 from pipelines.training.data import held_out_loader, model_config, training_loader
-from pipelines.training.evaluation import evaluate
+from pipelines.training.evaluation import curve_values, evaluate, held_out_errors
 from pipelines.training.pictures import draw_curves, draw_dream
 from wsm_data.access.release import open_release
 from wsm_data.errors import ConfigError
@@ -40,12 +41,13 @@ from wsm_data.shards.latent_standard import latent_standard
 from wsm_data.shards.release_codec import codec_of
 from wsm_model.config import ModelConfig
 from wsm_model.evaluation.decoding import Decoding
+from wsm_model.evaluation.summary import summarise
 from wsm_model.model import WorldSlamModel
 from wsm_model.model_file import ModelCard, load_model, save_model
 from wsm_model.ranks import leave_ranks, rank_and_world_size, shard_model, start_ranks, unsharded, wait_for_all
 from wsm_model.training.checkpoint import checkpoints
 from wsm_model.training.loop import Hooks, TrainingRun, resume, total_steps, train
-from wsm_model.training.metrics import metrics_writer
+from wsm_model.training.metrics import MetricsWriter, metrics_writer
 from wsm_model.training.pretraining import pretraining_step
 from wsm_model.training.schedule import make_optimiser
 from wsm_model.weights.from_wan import load_wan_weights
@@ -160,13 +162,15 @@ def _hooks(
     quiet: bool,
     must_stop: Callable[[], bool],
 ) -> Iterator[Hooks]:
-    """Metrics, pictures and the progress bar, of the first rank; the others only take part in the pictures."""
+    """Metrics, pictures and the progress bar, of the first rank; the others only take part in what is sampled."""
     rank, _ = rank_and_world_size()
-    sample = _sampler(config, out, model, device)
     if rank:
-        yield Hooks(
-            metrics=lambda _step, _values: None, sample=sample, progress=lambda _done: None, must_stop=must_stop
-        )
+
+        def unheard(step: int, values: Mapping[str, float]) -> None:
+            """Metrics are the first rank's to write."""
+
+        sample = _sampler(config, out, model, device, unheard)
+        yield Hooks(metrics=unheard, sample=sample, progress=lambda _done: None, must_stop=must_stop)
         return
     with (
         metrics_writer(out, done) as write,
@@ -180,31 +184,29 @@ def _hooks(
         def progress(now: int) -> None:
             bar.update(now - bar.n)
 
+        sample = _sampler(config, out, model, device, write)
         yield Hooks(metrics=show, sample=sample, progress=progress, must_stop=must_stop)
 
 
-def _sampler(config: TrainRunConfig, out: Path, model: WorldSlamModel, device: torch.device) -> Any:
-    """What draws the first held-out clip, and the curves, after a step; what it needs is opened now."""
+def _sampler(
+    config: TrainRunConfig, out: Path, model: WorldSlamModel, device: torch.device, write: MetricsWriter
+) -> Callable[[int], None]:
+    """What measures held-out clips after a step, and draws the first and the curves; what it needs is opened now."""
     if not config.training.sample_every:
         return lambda _step: None
     rank, _ = rank_and_world_size()
-    batch, decoding = _first_held_out(config, device), _decoding(config)
+    batches, decoding = _first_held_out(config, device), _decoding(config)
+    shift = config.training.loss.flow_shift
 
     def sample(step: int) -> None:
         was_training = model.training
         model.eval()
         path = out / "samples" / f"step-{step:06d}.png" if rank == 0 else None
         with unsharded(model):
-            draw_dream(
-                model,
-                batch,
-                decoding,
-                config.held_out,
-                path,
-                shift=config.training.loss.flow_shift,
-                title=f"after step {step}",
-            )
+            draw_dream(model, batches[0], decoding, config.held_out, path, shift=shift, title=f"after step {step}")
+            errors = held_out_errors(model, batches, config.held_out, decoding=decoding, shift=shift, quiet=True)
         model.train(was_training)
+        write(step, curve_values(summarise(errors)))
         if rank == 0:
             draw_curves(out)
         wait_for_all()
@@ -212,7 +214,7 @@ def _sampler(config: TrainRunConfig, out: Path, model: WorldSlamModel, device: t
     return sample
 
 
-def _first_held_out(config: TrainRunConfig, device: torch.device) -> Batch:
+def _first_held_out(config: TrainRunConfig, device: torch.device) -> list[Batch]:
     loader = held_out_loader(config, device)
     if loader is None:
         raise ConfigError(
@@ -220,7 +222,7 @@ def _first_held_out(config: TrainRunConfig, device: torch.device) -> Batch:
             "held_out.split, or set training.sample_every=0"
         )
     with loader:
-        return next(iter(loader))
+        return list(islice(loader, config.held_out.sampled_clips))
 
 
 def _decoding(config: TrainRunConfig) -> Decoding:

@@ -11,7 +11,7 @@ import torch
 
 from pipelines.training.config import HeldOutConfig, TrainRunConfig
 from pipelines.training.data import held_out_loader
-from pipelines.training.evaluation import evaluate, evaluation_table
+from pipelines.training.evaluation import curve_values, evaluate, evaluation_table
 from wsm_data.codecs.dct import DctCodec
 from wsm_data.loaders.config import SourceConfig
 from wsm_data.shards.latent_standard import latent_standard
@@ -119,3 +119,8 @@ def test_the_table_shows_what_it_was_given():
         "dream at +1, SSIM 0.500 copy 0.500, shrunk copy 0.500",
         "flow matching 1.250 copy 2.500, unconditional 1.500",
     ]
+
+
+def test_a_curve_has_a_number_for_each_latent_ahead_and_none_for_what_is_unknown():
+    means = {"depth_abs_rel": 0.5, "ate_rmse_sim3_m": None, "dream_psnr_db": [20.0, None]}
+    assert curve_values(means) == {"held_out_depth_abs_rel": 0.5, "held_out_dream_psnr_db_1": 20.0}

@@ -24,10 +24,10 @@ def smoothed(values: Float64Array, window: int) -> Float64Array:
 
 
 def draw_training_curves(records: Sequence[Mapping[str, object]], units: Mapping[str, str], path: Path) -> None:
-    """Write the curves as a PNG, one panel for each name of `units`.
+    """Write the curves as a PNG, one panel for each name of `units` that any record has.
 
     Args:
-        records: lines of a run's metrics: `step` and numbers by name.
+        records: lines of a run's metrics: `step` and numbers by name; what was measured now and then is in some alone.
         units: what is drawn, with the label of its axis, in this order.
         path: where the PNG goes; replaced atomically.
 
@@ -36,14 +36,14 @@ def draw_training_curves(records: Sequence[Mapping[str, object]], units: Mapping
     """
     if not records:
         raise ValueError("a run without a logged step has no curves")
-    steps = np.array([float(str(record["step"])) for record in records])
-    names = [name for name in units if all(name in record for record in records)]
+    held = {name: [record for record in records if name in record] for name in units}
+    names = [name for name in units if held[name]]
     rows = -(-len(names) // _COLUMNS)
-    window = max(1, round(_SMOOTHING_SHARE * len(steps)))
     with figure_style():
         figure = new_figure(_COLUMNS * _PANEL_PX[0], rows * _PANEL_PX[1])
         for number, name in enumerate(names):
-            values = np.array([float(str(record[name])) for record in records])
+            steps, values = (np.array([float(str(one[key])) for one in held[name]]) for key in ("step", name))
+            window = max(1, round(_SMOOTHING_SHARE * len(steps)))
             axes = figure.add_subplot(rows, _COLUMNS, number + 1)
             axes.plot(steps, values, color=MUTED, lw=0.6, alpha=0.45)
             axes.plot(steps, smoothed(values, window), color=BAR, lw=1.8)

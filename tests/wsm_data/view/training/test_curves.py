@@ -32,6 +32,16 @@ def test_a_picture_has_a_panel_for_each_name_that_was_logged(tmp_path):
     assert (tmp_path / "same.png").read_bytes() == (tmp_path / "curves.png").read_bytes()
 
 
+def test_what_is_measured_now_and_then_has_a_panel_of_its_own_steps(tmp_path):
+    now_and_then = [{"step": step, "held_out": 1 / step} for step in (10, 20, 30)]
+    units = UNITS | {"held_out": "error (1)"}
+    draw_training_curves(records(50) + now_and_then, units, tmp_path / "both.png")
+    assert cv2.imread(str(tmp_path / "both.png")).shape == (600, 1440, 3)
+    draw_training_curves(records(50) + now_and_then, UNITS, tmp_path / "one.png")
+    draw_training_curves(records(50), UNITS, tmp_path / "same.png")
+    assert (tmp_path / "one.png").read_bytes() == (tmp_path / "same.png").read_bytes()
+
+
 def test_equal_runs_give_equal_bytes_and_other_numbers_another_picture(tmp_path):
     for name, count in (("a", 50), ("b", 50), ("c", 40)):
         draw_training_curves(records(count), UNITS, tmp_path / name)
