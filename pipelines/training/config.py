@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 from wsm_data.loaders.config import OrderConfig, ReadConfig, SourceConfig
-from wsm_model.config import Variant
+from wsm_model.config import Prediction, Variant
 from wsm_model.inference.session import SessionConfig
 from wsm_model.model import Attention
 from wsm_model.training.budget import HardwareConfig
@@ -17,12 +17,14 @@ class ModelChoice:
     Attributes:
         size: `tiny`, `small` or `wsm5b`.
         variant: `slam`, or `idm` for the ablation without SLAM.
+        prediction: `velocity` or `clean`: what the RGB head says of noisy latents; `none`: that of the size.
         weights: folder of the transformer of Wan2.2-TI2V-5B to start from; empty: from random weights.
         attention: how the joint attention is evaluated: `auto`, `flex`, `blocks` or `dense`.
     """
 
     size: str = "tiny"
     variant: Variant = Variant.SLAM
+    prediction: Prediction | None = None
     weights: str = ""
     attention: Attention = Attention.AUTO
 

@@ -83,4 +83,5 @@ def model_config(config: TrainRunConfig, manifest: ReleaseManifest) -> ModelConf
         found = preset(config.model.size, latent_height=height, latent_width=width, variant=config.model.variant)
     except ValueError as error:
         raise ConfigError(f"release {manifest.name} does not fit the model: {error}") from error
-    return replace(found, latent_channels=manifest.codec.channels)
+    prediction = config.model.prediction or found.prediction
+    return replace(found, latent_channels=manifest.codec.channels, prediction=prediction)

@@ -17,7 +17,7 @@ from wsm_data.loaders.config import OrderConfig, ReadConfig, Remainder, SourceCo
 from wsm_data.shards.latent_standard import latent_standard
 from wsm_data.shards.manifest import ReleaseManifest, manifest_bytes
 from wsm_data.shards.statistics import LatentStatistics
-from wsm_model.config import Variant
+from wsm_model.config import Prediction, Variant
 
 CPU = torch.device("cpu")
 NO_STATISTICS = LatentStatistics(mean=(), std=(), count=0)
@@ -84,6 +84,12 @@ def test_a_model_takes_rows_columns_and_channels_of_the_latents(run_config, tiny
     found = model_config(run_config(model=choice), manifest(tiny, codec=replace(tiny.codec, channels=16)))
     assert (found.latent_height, found.latent_width, found.latent_channels) == (6, 10, 16)
     assert (found.layers, found.variant) == (6, Variant.IDM)
+
+
+@pytest.mark.parametrize(("chosen", "wanted"), [(None, Prediction.CLEAN), (Prediction.VELOCITY, Prediction.VELOCITY)])
+def test_a_prediction_that_is_chosen_comes_before_that_of_the_size(run_config, tiny, chosen, wanted):
+    choice = ModelChoice(size="tiny", prediction=chosen)
+    assert model_config(run_config(model=choice), manifest(tiny)).prediction is wanted
 
 
 @pytest.mark.parametrize("size", [{"encoded_height_px": 80}, {"encoded_width_px": 176}])
