@@ -71,7 +71,7 @@ def stage_config(recipe: Recipe, name: str, run: Path) -> object:
     """The config of one stage of a run.
 
     Every input field named after a stage is that stage's folder in the run; what looks at the release decodes it with
-    the weights that it was encoded with.
+    the weights that it was encoded with, and the report audits it by what was dealt as a whole.
     """
     stage = load_stage(name)
     wanted = input_fields(stage.config_type)
@@ -83,6 +83,8 @@ def stage_config(recipe: Recipe, name: str, run: Path) -> object:
         inputs["release"] = str(release_folder(run / "pack"))
         weights = _codec_settings(recipe).get("weights", "")
         inputs |= {"weights": weights} if "weights" in wanted else {}
+    if name == "report" and "by" in recipe.settings.get("split", {}):
+        inputs["split_by"] = recipe.settings["split"]["by"]  # the report's audit holds the splits to this
     return build_config(stage.config_type, merge(inputs, settings), name)
 
 

@@ -10,6 +10,9 @@ from pipelines.running.ledger import read_ledger
 from pipelines.running.stage import DONE, REFUSED, Outcome, Stage, StageContext, Unit
 from pipelines.running.upstream import pending_units
 from wsm_data.access.release import open_release, read_manifest
+from wsm_data.curation.audit.finding import Severity
+from wsm_data.curation.audit.guards import AuditConfig, audit_release
+from wsm_data.curation.split import SplitBy
 from wsm_data.files.digest import digest_json, sha256_file
 from wsm_data.files.stores import open_store
 from wsm_data.files.typed_toml import INPUT
@@ -17,7 +20,7 @@ from wsm_data.shards.manifest import release_digest
 from wsm_data.shards.release_codec import codec_of
 from wsm_data.view.release.clip_survey import SurveyConfig, survey_clips
 from wsm_data.view.release.report import write_report
-from wsm_data.view.release.report_data import ReportData, StageSummary
+from wsm_data.view.release.report_data import ReportData, StageSummary, covered_seconds
 
 REPORT_FILE = "report.html"
 
@@ -31,12 +34,16 @@ class ReportConfig:
         run: run folder whose stages are shown; where it is not given, the one the release lies in, if it does.
         weights: local folder of the codec's weights, where the codec has any.
         survey: how many clips are read, and how many are shown.
+        audit: whether the release is audited as `wsm audit` does, which reads the labels of every clip.
+        split_by: what was dealt as a whole when the splits were made; a recipe gives that of `split`.
     """
 
     release: str = field(metadata=INPUT)
     run: str = field(default="", metadata=INPUT)
     weights: str = field(default="", metadata=INPUT)
     survey: SurveyConfig = field(default_factory=SurveyConfig)
+    audit: bool = True
+    split_by: SplitBy = SplitBy.TRAJECTORY
 
 
 def _list_units(config: ReportConfig) -> Sequence[Unit]:
@@ -48,9 +55,12 @@ def _process(batch: Sequence[Unit], config: ReportConfig, context: StageContext)
     for unit in batch:
         release = open_release(config.release)
         survey = survey_clips(release, codec_of(release.manifest, config.weights), config.survey)
+        audit = tuple(audit_release(release, AuditConfig(split_by=config.split_by))) if config.audit else None
         path = context.out / REPORT_FILE
-        write_report(ReportData(survey=survey, stages=stage_summaries(_run_folder(config))), release, path)
+        data = ReportData(survey=survey, stages=stage_summaries(_run_folder(config)), audit=audit)
+        write_report(data, release, path)
         facts = {"bytes": path.stat().st_size, "clips shown": len(survey.thumbnails)}
+        facts |= {"audit errors": sum(one.severity is Severity.ERROR for one in audit)} if audit is not None else {}
         yield Outcome(unit=unit.id, digest=sha256_file(path), outputs=(REPORT_FILE,), facts=facts)
 
 
@@ -61,7 +71,8 @@ def stage_summaries(run: Path) -> tuple[StageSummary, ...]:
         record = read_stage_record(run / entry.name)
         if record is None or not record.finished:
             continue
-        outcomes = [one.outcome for one in read_ledger(run / entry.name).values()]
+        settled = read_ledger(run / entry.name).values()
+        outcomes = [one.outcome for one in settled]
         summaries.append(
             StageSummary(
                 name=record.name,
@@ -71,6 +82,7 @@ def stage_summaries(run: Path) -> tuple[StageSummary, ...]:
                 refused=sum(outcome.state == REFUSED for outcome in outcomes),
                 pending=len(pending_units(run / entry.name)),
                 seconds=sum(outcome.seconds for outcome in outcomes),
+                wall_seconds=covered_seconds((one.time_s - one.outcome.seconds, one.time_s) for one in settled),
                 workers=record.workers,
                 fingerprint=record.fingerprint,
             )
@@ -88,4 +100,4 @@ def _run_folder(config: ReportConfig) -> Path:
     return Path(config.run) if config.run else Path(config.release).parent.parent
 
 
-STAGE = Stage(name="report", version=1, config_type=ReportConfig, list_units=_list_units, process=_process)
+STAGE = Stage(name="report", version=2, config_type=ReportConfig, list_units=_list_units, process=_process)

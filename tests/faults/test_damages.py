@@ -94,7 +94,9 @@ def what_follows(run, out, wanted, planted):
     return "refused"
 
 
-@pytest.mark.parametrize("count", [pytest.param(12), pytest.param(400, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "count", [pytest.param(12), pytest.param(400, marks=[pytest.mark.slow, pytest.mark.timeout(7200)])]
+)
 def test_after_any_damage_the_results_are_the_same_or_the_next_commands_say_no(count, whole, again, tmp_path, faults):
     chance = random.Random(count)
     wanted = results(whole)

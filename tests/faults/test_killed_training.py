@@ -100,6 +100,7 @@ def test_a_resume_from_beyond_what_was_trained_is_found_out(run, session):
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(7200)
 def test_killed_twenty_times_a_run_has_seen_every_clip_as_if_undisturbed(run, session, faults):
     run |= {"epochs": 10}
     for kill in range(20):  # twice an epoch, before and after the step is recorded, alone and as one of two

@@ -7,6 +7,7 @@ import pytest
 from pipelines.recipe import Recipe, load_recipe, recipe_names, recipe_summaries, stage_config, stage_sections
 from pipelines.registry import STAGES, load_stage
 from pipelines.running.settings import parse_assignments
+from wsm_data.curation.split import SplitBy
 from wsm_data.errors import ConfigError
 
 
@@ -93,6 +94,13 @@ def test_what_shows_a_release_decodes_it_with_the_weights_it_was_encoded_with():
     assert stage_config(recipe, "report", Path("run")).weights == "vae"
     assert stage_config(recipe, "verify", Path("run")).release == "run/pack/release"
     assert stage_config(load_recipe("demo", None, {}), "report", Path("run")).weights == ""
+
+
+def test_the_report_audits_the_split_by_what_was_dealt_as_a_whole():
+    by_scene = load_recipe("demo", None, parse_assignments(["split.by=scene"]))
+    assert stage_config(by_scene, "report", Path("run")).split_by is SplitBy.SCENE
+    own = load_recipe("demo", None, parse_assignments(["split.by=scene", "report.split_by=trajectory"]))
+    assert stage_config(own, "report", Path("run")).split_by is SplitBy.TRAJECTORY
 
 
 def test_other_weights_may_be_given_to_the_report():

@@ -6,6 +6,7 @@ import pytest
 from box_room import along_x
 
 from pipelines.stages.report import REPORT_FILE, stage_summaries
+from wsm_data.curation.audit.finding import Check
 from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.files.digest import sha256_file
 from wsm_data.files.sealed import sealed, unsealed
@@ -31,7 +32,7 @@ def test_the_report_is_one_file_that_needs_nothing_else(finished):
     path = finished.folder("report") / REPORT_FILE
     assert outcome.outputs == (REPORT_FILE,)
     assert outcome.digest == sha256_file(path)
-    assert outcome.facts == {"bytes": path.stat().st_size, "clips shown": 1}
+    assert outcome.facts == {"bytes": path.stat().st_size, "clips shown": 1, "audit errors": 0}
     html = page(finished)
     assert html.lower().startswith("<!doctype html>")
     assert not re.search(r'(?:src|href)="(?!data:|#)', html)
@@ -44,6 +45,15 @@ def test_the_report_shows_the_stages_that_made_the_release(copied):
         assert re.search(rf"<t[dh][^>]*>\s*{stage}\s*<", html), stage
 
 
+def test_the_report_shows_what_an_audit_finds_unless_it_is_not_asked_for(copied):
+    copied.run("report")
+    html = page(copied)
+    assert [one for one in Check if f"<code>{one.value}</code>" not in html] == []
+    shutil.rmtree(copied.folder("report"))
+    copied.run("report", audit=False)
+    assert "no audit was asked for" in page(copied)
+
+
 def test_the_summaries_count_what_the_ledgers_hold(make_pipeline):
     pipeline = make_pipeline({ZED: ({0: along_x(), 1: along_x(y_m=1.7)}, True)}, split={"test_fraction": 0.0})
     pipeline.run_to("pack")
@@ -51,6 +61,7 @@ def test_the_summaries_count_what_the_ledgers_hold(make_pipeline):
     assert list(found) == ["index", "split", "map", "encode", "pack"]
     encode = found["encode"]
     assert (encode.units, encode.done, encode.refused, encode.pending, encode.workers) == (2, 1, 1, 0, 1)
+    assert 0 < encode.wall_seconds <= encode.seconds + 0.01  # one worker, times in milliseconds
     assert encode.seconds == pytest.approx(sum(one.seconds for one in pipeline.outcomes("encode").values()))
 
 

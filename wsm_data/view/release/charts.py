@@ -76,20 +76,22 @@ def depth_error_chart(errors: DepthErrors) -> Figure:
 
 
 def stage_chart(stages: Sequence[StageSummary]) -> Figure:
-    """Time of each stage, summed over workers, as bars in the order of the flow; call within `figure_style()`."""
+    """Time of each stage on the wall as bars in the order of the flow; call within `figure_style()`."""
     height_px = 90 + 34 * len(stages)
     left_px = 50 + 8 * max((len(stage.name) for stage in stages), default=0)
     figure = new_figure(_BROAD_PX, height_px)
     axes = figure.add_axes((left_px / _BROAD_PX, 62 / height_px, 1 - (left_px + 26) / _BROAD_PX, 1 - 70 / height_px))
-    seconds = [stage.seconds for stage in stages]
+    seconds = [stage.wall_seconds for stage in stages]
     axes.barh(range(len(stages)), seconds, height=0.66, color=BAR, lw=0)
     for row, stage in enumerate(stages):
         rate = "" if stage.done_per_s is None else f", {stage.done_per_s:.3g} units per s"
-        text = f"{stage.seconds:.1f} s" + rate
-        axes.annotate(text, (stage.seconds, row), xytext=(6, 0), textcoords="offset points", va="center", fontsize=10)
+        text = f"{stage.wall_seconds:.1f} s" + rate
+        axes.annotate(
+            text, (stage.wall_seconds, row), xytext=(6, 0), textcoords="offset points", va="center", fontsize=10
+        )
     axes.set_yticks(range(len(stages)), [stage.name for stage in stages])
     axes.invert_yaxis()
-    axes.set(xlabel="time on its units, summed over workers (s)", ylabel="stage (name)")
+    axes.set(xlabel="time on the wall in which its units were worked on (s)", ylabel="stage (name)")
     axes.set_xlim(0, max(seconds, default=0.0) * 1.3 or 1.0)
     axes.tick_params(axis="y", length=0)
     axes.grid(axis="x")

@@ -8,6 +8,7 @@ from markupsafe import Markup
 
 from wsm_data.access.release import Release
 from wsm_data.codecs.quality import CodecQuality
+from wsm_data.curation.audit.finding import Check
 from wsm_data.files.atomic import write_bytes
 from wsm_data.files.json_values import from_json
 from wsm_data.shards.manifest import release_digest
@@ -40,6 +41,16 @@ class _Card:
     depth: tuple[str, ...]
     measured: tuple[float, ...]
     map_svg: Markup
+
+
+@dataclass(frozen=True, kw_only=True)
+class _AuditRow:
+    """What one check of the audit found; the example is a worst one."""
+
+    check: str
+    found: int
+    worst: str
+    example: str
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,9 +98,26 @@ def report_html(data: ReportData, release: Release) -> str:
             scene_swatches=SCENE_SWATCHES,
             scenes=_scenes(data.survey),
             cards=[_card(number, one, data.survey) for number, one in enumerate(data.survey.thumbnails)],
+            audit=_audit(data),
             stages=data.stages,
             stage_svg=_stage_svg(data) if data.stages else None,
         )
+
+
+def _audit(data: ReportData) -> list[_AuditRow] | None:
+    """Checks with what they found; None where nobody looked."""
+    if data.audit is None:
+        return None
+    of_check = {check: [one for one in data.audit if one.check is check] for check in Check}
+    return [
+        _AuditRow(
+            check=check.value,
+            found=len(found),
+            worst=found[0].severity.value if found else "",
+            example=found[0].message if found else "",
+        )
+        for check, found in of_check.items()
+    ]
 
 
 def _distributions(survey: ClipSurvey, counts: ReleaseCounts) -> list[Distribution]:
@@ -111,7 +139,7 @@ def _quality_svg(quality: CodecQuality) -> Markup:
 
 
 def _stage_svg(data: ReportData) -> Markup:
-    return inline_svg(stage_chart(data.stages), "stages", "Seconds that each stage took")
+    return inline_svg(stage_chart(data.stages), "stages", "Seconds on the wall that each stage took")
 
 
 def _scenes(survey: ClipSurvey) -> list[_Figure]:

@@ -1,7 +1,10 @@
 """What is known about a release beyond its own files, and handed to the report."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from math import inf
 
+from wsm_data.curation.audit.finding import AuditFinding
 from wsm_data.view.release.clip_survey import ClipSurvey
 
 
@@ -17,6 +20,7 @@ class StageSummary:
         refused: units that are refused.
         pending: units without an outcome yet.
         seconds: time spent on its units, summed over workers, s.
+        wall_seconds: time in which at least one worker was at a unit, s; pauses between runs are left out.
         workers: worker processes of its last run.
         fingerprint: digest of name, version and settings.
     """
@@ -28,13 +32,23 @@ class StageSummary:
     refused: int
     pending: int = 0
     seconds: float
+    wall_seconds: float
     workers: int
     fingerprint: str = ""
 
     @property
     def done_per_s(self) -> float | None:
-        """Units done for each second spent on units, refused ones included; None where no time was measured."""
-        return self.done / self.seconds if self.seconds else None
+        """Units done for each second on the wall, the time of refused ones included; None where none was measured."""
+        return self.done / self.wall_seconds if self.wall_seconds else None
+
+
+def covered_seconds(spans: Iterable[tuple[float, float]]) -> float:
+    """Length of the union of spans of time (begin, end), s."""
+    total, reached = 0.0, -inf
+    for begin, end in sorted(spans):
+        total += max(0.0, end - max(begin, reached))
+        reached = max(reached, end)
+    return total
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,7 +58,9 @@ class ReportData:
     Attributes:
         survey: numbers and pictures of clips.
         stages: the stages in the order of the flow; empty when the folder of the run is not at hand.
+        audit: what leaks, is there twice or contradicts itself, worst first; None where nobody looked.
     """
 
     survey: ClipSurvey
     stages: tuple[StageSummary, ...] = ()
+    audit: tuple[AuditFinding, ...] | None = None

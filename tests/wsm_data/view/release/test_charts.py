@@ -15,7 +15,9 @@ def distribution(*values, share=False, finest=0.1):
 
 
 def stage(name="encode", seconds=2.0, done=7):
-    return StageSummary(name=name, version=1, units=9, done=done, refused=2, seconds=seconds, workers=2)
+    return StageSummary(
+        name=name, version=1, units=9, done=done, refused=2, seconds=2 * seconds, wall_seconds=seconds, workers=2
+    )
 
 
 def test_a_histogram_counts_every_value_once_and_names_the_median(made):

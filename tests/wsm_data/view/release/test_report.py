@@ -9,8 +9,18 @@ from wsm_data.view.release.report import report_html, write_report
 from wsm_data.view.release.report_data import ReportData, StageSummary
 
 STAGES = (
-    StageSummary(name="index", version=1, units=9, done=8, refused=1, seconds=3.5, workers=2, fingerprint="f00d" * 16),
-    StageSummary(name="encode", version=2, units=8, done=6, refused=2, seconds=61.25, workers=2),
+    StageSummary(
+        name="index",
+        version=1,
+        units=9,
+        done=8,
+        refused=1,
+        seconds=3.5,
+        wall_seconds=2.5,
+        workers=2,
+        fingerprint="f00d" * 16,
+    ),
+    StageSummary(name="encode", version=2, units=8, done=6, refused=2, seconds=122.25, wall_seconds=61.25, workers=2),
 )
 VOID = {"meta", "img", "br", "link", "input", "hr"}
 
@@ -106,7 +116,7 @@ def test_codec_quality_is_in_decibels_and_metres(page):
 
 
 def test_stages_licences_and_fingerprints_are_there(page):
-    for words in ("61.2 s", "encode", "f00df00df00df00d", "CC0-1.0", "ab12"):
+    for words in ("61.2 s", "122.2", "Seconds summed over workers", "encode", "f00df00df00df00d", "CC0-1.0", "ab12"):
         assert words in page.text
 
 
