@@ -76,8 +76,8 @@ def refusing_unparsable(where: str) -> Iterator[None]:
 
 
 def _require_name(name: str) -> None:
-    if printable(name) != name:
+    if printable(name) != name or "\n" in name or "\t" in name:
         raise DataError(
             Reason.CONTAINER_UNSTORABLE_NAME,
-            f"{name} must be a name in UTF-8 without control characters: it can be neither stored nor shown; rename it",
+            f"{name!r} must be a name in UTF-8 without control characters: it can be neither stored nor shown; rename it",
         )

@@ -52,7 +52,9 @@ def test_a_fault_of_the_reader_and_a_foreseen_error_pass(error):
         raise error
 
 
-@pytest.mark.parametrize(("name", "shown"), [("g/a\x1b[31m", r"a\\x1b\[31m"), ("g/\udcff", r"\\udcff")])
+@pytest.mark.parametrize(
+    ("name", "shown"), [("g/a\x1b[31m", r"a\\x1b\[31m"), ("g/\udcff", r"\\udcff"), ("g/a\nb", r"a\\nb")]
+)
 def test_a_name_that_cannot_be_stored_or_shown_is_refused_escaped(dataset, name, shown):
     with pytest.raises(DataError, match=shown) as caught:
         guarded(INTERNDATA).scan(Path(), container(name), dataset, 1)
