@@ -79,5 +79,6 @@ def _require_name(name: str) -> None:
     if printable(name) != name or "\n" in name or "\t" in name:
         raise DataError(
             Reason.CONTAINER_UNSTORABLE_NAME,
-            f"{name!r} must be a name in UTF-8 without control characters: it can be neither stored nor shown; rename it",
+            f"{name!r} must be a name in UTF-8 without control characters: it can be neither stored nor shown; "
+            "rename it",
         )
