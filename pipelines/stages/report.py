@@ -82,7 +82,7 @@ def stage_summaries(run: Path) -> tuple[StageSummary, ...]:
                 refused=sum(outcome.state == REFUSED for outcome in outcomes),
                 pending=len(pending_units(run / entry.name)),
                 seconds=sum(outcome.seconds for outcome in outcomes),
-                wall_seconds=covered_seconds((one.time_s - one.outcome.seconds, one.time_s) for one in settled),
+                wall_seconds=covered_seconds((one.time - one.outcome.seconds, one.time) for one in settled),
                 workers=record.workers,
                 fingerprint=record.fingerprint,
             )
