@@ -20,6 +20,16 @@ KINDS = (
         "made again, or refused with exit code 4",
         "tests/faults/test_damages.py",
     ),
+    (
+        "pipes, devices, sizes and numbers without measure, names that climb, in a source",
+        "one line of the quarantine; the rest is read",
+        "tests/faults/test_hostile_inputs.py",
+    ),
+    (
+        "scores or a selection in a release flipped or cut",
+        "found by `wsm verify`, or nothing that is read changes",
+        "tests/wsm_data/curation/test_attached.py",
+    ),
     ("checkpoint damaged", "refused; never trained on", "tests/faults/test_damaged_checkpoints.py"),
     (
         "output of a stage damaged, same size",

@@ -21,11 +21,17 @@ from wsm_data.schema.verdict import Verdict
 _T_BODY_OPENCV = np.array([[0.0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 """OpenCV camera to a camera stored in body axes (x forward, y left, z up)."""
 
+_SHIFTED, _INVERTED = "those of", "world to camera"
+
 _HALF_TURN = np.diag([-1.0, 1.0, -1.0, 1.0])
 """Half a turn about the camera's vertical axis: the camera looks backwards."""
 
 _STORED_AXES: Mapping[str, Float64Array] = {**T_STORED_OPENCV, "body (x forward, y left, z up)": _T_BODY_OPENCV}
 
+
+_DEPTH_SCALES: Mapping[str, float] = {f"depth were divided by {scale:g}": scale for scale in (5.0, 10.0, 1000.0, 0.2)}
+"""Units that are mistaken for one another: millimetres, metres, 1/10 mm, and the 1/5000 m of TUM's benchmark. Depth
+that is far too small tells nothing: the poses lead out of all that it shows."""
 
 MAX_POINTS = 1600
 """So many pixels of a frame are compared at most."""
@@ -65,7 +71,7 @@ def check_depth_agreement(
     is a median error over the limit, over the points that can tell (see the module); and poses that do not fit where
     another meaning of them does, and errs by half at most (noise alone prefers none by that much), over the points that
     tell these two apart: other camera axes, a camera that looks backwards, inverse matrices, poses of a few frames
-    earlier or later. A pair with too few such points tells nothing,
+    earlier or later, depth in another unit. A pair with too few such points tells nothing,
     and a trajectory of such pairs alone is kept, with `pairs` = 0. What the geometry hides cannot be refused: straight
     driving at constant speed shows no time offset.
 
@@ -83,7 +89,7 @@ def check_depth_agreement(
     own = [_errors(record, record.T_world_camera, pair) for pair in compared]
     median, used = _median_error(record, compared, own, max_error)
     meanings = _meanings(record.T_world_camera @ invert(T_STORED_OPENCV[camera_axes]))
-    meanings |= _shifted(record.T_world_camera)
+    meanings |= _shifted(record.T_world_camera) | _rescaled(record.T_world_camera)
     errors = {name: _against(record, poses, compared, own, max_error) for name, poses in meanings.items()}
     better = {
         name: other
@@ -95,15 +101,10 @@ def check_depth_agreement(
     if not better and (median is None or median <= max_error):
         return Verdict(measured=measured, limits=limits)
     fits = min(better, key=lambda name: better[name], default=None)
-    advice = (
-        f"they would agree if the poses were {fits}: correct the manifest's camera_axes, or the source"
-        if fits is not None
-        else "no other meaning of the poses fits either: poses and images are of different trajectories, or out of step"
-    )
     found = _found(median, used, errors.get(fits or ""))
     message = (
         f"{record.id.text}: depth moved along the poses must agree within {max_error:.0%}, found {found} "
-        f"with poses stored as {camera_axes}; {advice}"
+        f"with poses stored as {camera_axes}; {_advice(fits)}"
     )
     tried = {
         name: {"own": mine, "other": other, "deciding_share": share}
@@ -112,6 +113,23 @@ def check_depth_agreement(
     }
     details = {**measured, "errors_where_they_differ": tried, "fits": fits}
     return Verdict(reason=Reason.POSE_DEPTH_DISAGREE, message=message, measured=details, limits=limits)
+
+
+def _advice(fits: str | None) -> str:
+    """What to do about it, by the meaning that fits."""
+    if fits is None:
+        return (
+            "no other meaning of the poses fits either: poses and images are of different trajectories, or out of step"
+        )
+    if fits in _DEPTH_SCALES:
+        return f"they would agree if {fits}: correct depth.metres_per_unit of the manifest"
+    if fits.startswith(_SHIFTED):
+        remedy = "they are out of step with the images; move one against the other in the source"
+    elif fits.startswith(_INVERTED):
+        remedy = "invert them in the source"
+    else:
+        remedy = "correct the manifest's camera_axes, or the source"
+    return f"they would agree if the poses were {fits}: {remedy}"
 
 
 def _found(median: float | None, pairs: int, best: tuple[float, float, float] | None) -> str:
@@ -127,7 +145,7 @@ def _meanings(T_world_stored: Float64Array) -> dict[str, Float64Array]:
     plain = {name: T_world_stored @ T_stored_opencv for name, T_stored_opencv in _STORED_AXES.items()}
     turned = {f"{name}, turned by 180 degrees of yaw": T @ _HALF_TURN for name, T in plain.items()}
     inverse = invert(T_world_stored)
-    return plain | turned | {f"world to camera, {name}": inverse @ T for name, T in _STORED_AXES.items()}
+    return plain | turned | {f"{_INVERTED}, {name}": inverse @ T for name, T in _STORED_AXES.items()}
 
 
 def _shifted(T_world_camera: Float64Array) -> dict[str, Float64Array]:
@@ -136,9 +154,18 @@ def _shifted(T_world_camera: Float64Array) -> dict[str, Float64Array]:
     for n in range(1, MAX_OFFSET_FRAMES + 1):
         frames = "1 frame" if n == 1 else f"{n} frames"
         missing = np.full((min(n, len(T_world_camera)), 4, 4), np.nan)
-        shifted[f"those of {frames} later"] = np.concatenate([T_world_camera[n:], missing])
-        shifted[f"those of {frames} earlier"] = np.concatenate([missing, T_world_camera[:-n]])
+        shifted[f"{_SHIFTED} {frames} later"] = np.concatenate([T_world_camera[n:], missing])
+        shifted[f"{_SHIFTED} {frames} earlier"] = np.concatenate([missing, T_world_camera[:-n]])
     return shifted
+
+
+def _rescaled(T_world_camera: Float64Array) -> dict[str, Float64Array]:
+    """Depth in another unit: relative errors are those of this depth along a way that is as many times longer."""
+    rescaled = {}
+    for name, scale in _DEPTH_SCALES.items():
+        rescaled[name] = T_world_camera.copy()
+        rescaled[name][:, :3, 3] *= scale
+    return rescaled
 
 
 def _errors(record: EpisodeRecord, T_world_camera: Float64Array, pair: DepthPair) -> Float64Array:

@@ -21,7 +21,7 @@ def check_depth_measured(valid: BoolArray, where: str) -> Verdict:
         return Verdict(measured=measured)
     message = (
         f"{where}: every depth image must hold a measurement; {len(blind)} of {len(share)} hold none, the first is "
-        f"frame {blind[0]}"
+        f"frame {blind[0]}: repair the source, or correct the manifest's depth.metres_per_unit and depth.invalid_codes"
     )
     details = {**measured, "frame": int(blind[0]), "frames": len(blind)}
     return Verdict(reason=Reason.DEPTH_NO_MEASUREMENT, message=message, measured=details)

@@ -68,14 +68,19 @@ def _read_recording(
         K = np.array(said["K"], np.float64).reshape(3, 3)
         width, height = image_size(scene, f"{episode}/rgb/000000.png", container)
         intrinsics = Intrinsics(fx=K[0, 0], fy=K[1, 1], cx=K[0, 2], cy=K[1, 2], width=width, height=height)
-        camera, floor, goal = str(said["camera"]), said["floor_z_m"], said["goal_world_m"]
+        camera, floor, goal = _name(said["camera"]), said["floor_z_m"], said["goal_world_m"]
         goal_world_m = None if goal is None else _point(goal)
         floor_z_m = dataset.motion.floor_z_m if floor is None else float(floor)
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise DataError(
             Reason.SEQUENCE_UNREADABLE,
             f"{where} must be as write_episode wrote it, but {error}; write it again",
         ) from error
+    if not np.isfinite(T_world_camera).all():
+        frame = int(np.flatnonzero(~np.isfinite(T_world_camera).all(axis=(1, 2)))[0])
+        raise DataError(
+            Reason.POSE_NOT_FINITE, f"{where}: poses must be finite, that of frame {frame} is not; write it again"
+        )
     kept = moving_frames(T_world_camera, dataset.motion).tolist()
     recording = Recording(
         container=container,
@@ -89,6 +94,13 @@ def _read_recording(
         goal_world_m=goal_world_m,
     )
     return recording, floor_z_m
+
+
+def _name(camera: object) -> str:
+    """The name of a camera, which becomes part of a group's."""
+    if not isinstance(camera, str) or not camera.isprintable() or "/" in camera:
+        raise ValueError(f"camera must be a name without `/` and control characters, found {camera!r}")
+    return camera
 
 
 def _point(numbers: Sequence[float]) -> tuple[float, float, float]:

@@ -155,6 +155,17 @@ def test_poses_out_of_step_with_the_images_are_refused_and_the_offset_named(make
     assert verdict.reason is Reason.POSE_DEPTH_DISAGREE
     frames, side = "1 frame" if abs(offset) == 1 else f"{abs(offset)} frames", "earlier" if offset > 0 else "later"
     assert verdict.measured["fits"] == f"those of {frames} {side}"
+    assert verdict.message.endswith("out of step with the images; move one against the other in the source")
+    assert "camera_axes" not in verdict.message
+
+
+@pytest.mark.parametrize("scale", [5.0, 10.0, 1000.0, 0.2])
+def test_depth_in_another_unit_is_refused_as_that(scene, scale):
+    record, depth_m = scene
+    verdict = check(record, {frame: (depth * scale).astype(np.float32) for frame, depth in depth_m.items()})
+    assert verdict.reason is Reason.POSE_DEPTH_DISAGREE
+    assert verdict.measured["fits"] == f"depth were divided by {scale:g}"
+    assert verdict.message.endswith("correct depth.metres_per_unit of the manifest")
 
 
 @pytest.mark.parametrize("share", [0.005, 0.01, 0.02])

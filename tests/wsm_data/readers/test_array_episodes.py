@@ -86,6 +86,23 @@ def test_a_damaged_episode_is_refused_and_the_other_goes_on(tmp_path, dataset, d
     assert [record.id.episode for record in found.records] == ["two"]
 
 
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"camera": ["cam"]}, Reason.SEQUENCE_UNREADABLE),
+        ({"camera": "\x1b[2J"}, Reason.SEQUENCE_UNREADABLE),
+        ({"camera": "a/b"}, Reason.SEQUENCE_UNREADABLE),
+        ({"T_world_camera": [[float("nan")] * 16] * 6}, Reason.POSE_NOT_FINITE),
+    ],
+)
+def test_a_camera_that_is_no_name_and_poses_that_are_no_numbers_are_refused(tmp_path, dataset, changes, reason):
+    folder = write_episode(tmp_path, "kitchen", "one", frames(), K=K, floor_z_m=0.0)
+    said = json.loads((folder / EPISODE_FILE).read_text())
+    (folder / EPISODE_FILE).write_text(json.dumps({**said, **changes}))
+    _, found = scan(tmp_path, dataset)
+    assert ([one.reason for one in found.refusals], found.records) == ([reason], ())
+
+
 def test_more_poses_than_images_are_a_missing_file(tmp_path, dataset):
     folder = write_episode(tmp_path, "kitchen", "one", frames(), K=K, floor_z_m=0.0)
     said = json.loads((folder / EPISODE_FILE).read_text())
