@@ -25,6 +25,7 @@ from pipelines.running.folder import (
     write_stage_record,
 )
 from pipelines.running.full_disk import full_disk_named
+from pipelines.running.gone_folder import gone_folder_named
 from pipelines.running.ledger import LedgerEntry, compact_ledger, is_whole, ledger_appender, read_ledger
 from pipelines.running.options import RunOptions
 from pipelines.running.quarantine import PENDING_FILE, QUARANTINE_FILE, write_pending, write_quarantine
@@ -77,7 +78,7 @@ def run_stage(
         ConfigError: the folder belongs to other settings, or is being written by another process; or `options.only`
             matches nothing.
         BudgetExceeded: more was refused than `options.max_refused` allows.
-        WsmError: the disk is full, or two units have one id.
+        WsmError: the disk is full, a folder that is read or filled was deleted, or two units have one id.
     """
     options = options or RunOptions()
     started = time.monotonic()
@@ -108,13 +109,14 @@ def run_stage(
     if options.dry_run:
         job.ledger.update(_standing(out))
         return _report(job, _selected(job), 0.0)
-    with full_disk_named(out), locked(out):
+    with full_disk_named(out), locked(out), gone_folder_named(config, out) as require_folders:
         remove_temporaries(out)
         job.ledger.update(_standing(out))
         selected = _selected(job)
         if selected or not _is_finished(job):
             write_stage_record(out, record)  # unfinished from here to the end, for whoever reads it
             _work(job, selected)
+            require_folders()
             _finish(job)
         else:
             _keep_record_current(job)
@@ -239,7 +241,7 @@ def _process_batch(
     left = {unit.id: unit for unit in batch}
     started = time.perf_counter()
     try:
-        with full_disk_named(context.out):
+        with full_disk_named(context.out), gone_folder_named(config, context.out):
             for outcome in stage.process(batch, config, context):
                 if left.pop(outcome.unit, None) is None:
                     raise RuntimeError(f"{stage.name} gave an outcome too many, for {outcome.unit}")

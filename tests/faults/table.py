@@ -53,6 +53,11 @@ KINDS = (
     ),
     ("disk full, in any command", "one sentence; goes on", "tests/pipelines/running/test_full_disk.py"),
     (
+        "folder of the source or of the run deleted while a stage works",
+        "one sentence that names it; goes on",
+        "tests/pipelines/running/test_gone_folder.py",
+    ),
+    (
         "nothing writable but `--out`",
         "kernels are kept in a temporary folder",
         "tests/wsm_data/files/test_kernel_cache.py",
