@@ -61,7 +61,7 @@ class SequenceSpan:
     chunk_size: int
 
     def __post_init__(self) -> None:
-        if min(self.length, self.chunk_size) < 1 or min(self.row, self.start) < 0:
+        if self.length < 1 or self.chunk_size < 1 or self.row < 0 or self.start < 0:
             raise ValueError(f"a sequence needs a place, a length and a chunk size of at least 1, found {self}")
 
     @property
