@@ -16,22 +16,16 @@ class SplitBy(StrEnum):
     SCENE = "scene"
 
 
-def split_of(episode: EpisodeId, by: SplitBy, test_fraction: float, seed: int) -> str:
-    """`test` where the hash of the name, as a number in [0, 1), lies below `test_fraction`, else `train`.
-
-    By trajectory the name is the episode's id (the paper's split, section 4.1). By scene it is the physical scene's
-    name, the same under every camera, so that no view of a test scene is trained on.
-    """
-    return _side(_dealt_name(episode, by), test_fraction, seed)
-
-
 def split_together(
     digests: Mapping[EpisodeId, str], by: SplitBy, test_fraction: float, seed: int
 ) -> dict[EpisodeId, str]:
-    """Sides of trajectories; those of equal content go to one side, that of the shortest name of them, the first.
+    """Sides of trajectories: `test` where the hash of a name, as a number in [0, 1), lies below `test_fraction`.
 
-    By scene, so do the scenes that share content, whole: what a scene shares with a second and this with a third
-    binds all three. Where no content is there twice this is `split_of` of each.
+    By trajectory the name is the episode's id (the paper's split, section 4.1). By scene it is the physical scene's
+    name, the same under every camera, so that no view of a test scene is trained on.
+
+    Trajectories of equal content go to one side, that of the shortest name of them, the first. By scene, so do the
+    scenes that share content, whole: what a scene shares with a second and this with a third binds all three.
 
     Args:
         digests: content digest of each trajectory.

@@ -4,7 +4,7 @@ from box_room import along_x
 from pipelines.artifacts.split_table import read_split
 from pipelines.stages.index import SameContent
 from pipelines.stages.split import SplitConfig
-from wsm_data.curation.split import SplitBy, leaking_scenes, split_of
+from wsm_data.curation.split import SplitBy, leaking_scenes, split_together
 from wsm_data.errors import ConfigError
 from wsm_data.files.digest import sha256_file
 from wsm_data.files.typed_toml import build_config
@@ -19,6 +19,12 @@ def short(count, from_y_m):
     return {number: along_x(y_m=from_y_m + 0.02 * number, frames=5) for number in range(count)}
 
 
+def own_sides(names, by, seed):
+    """Sides of trajectories as if the content of each were there once."""
+    sides = split_together({EpisodeId.parse(name): name for name in names}, by, 0.5, seed)
+    return {episode.text: side for episode, side in sides.items()}
+
+
 @pytest.fixture
 def indexed(make_pipeline):
     """Three short trajectories of one physical scene under each of two cameras."""
@@ -29,7 +35,7 @@ def indexed(make_pipeline):
 
 def test_every_accepted_trajectory_gets_the_side_its_name_says(indexed):
     indexed.run("split", test_fraction=0.5, seed=3)
-    wanted = {name: split_of(EpisodeId.parse(name), SplitBy.TRAJECTORY, 0.5, 3) for name in IDS}
+    wanted = own_sides(IDS, SplitBy.TRAJECTORY, 3)
     assert read_split(indexed.folder("split")) == wanted
     assert set(wanted.values()) == {"train", "test"}
 
@@ -84,7 +90,7 @@ def test_trajectories_of_equal_content_that_are_kept_go_to_one_side(make_pipelin
     pipeline.run("split", by=by, test_fraction=0.5, seed=1)
     splits = read_split(pipeline.folder("split"))
     assert len(splits) == 6
-    own = {name: split_of(EpisodeId.parse(name), by, 0.5, 1) for name in splits}
+    own = own_sides(splits, by, 1)
     copies = {f"{D435I}/{number:06d}": f"{D435I} (1)/{number:06d}" for number in range(3)}
     assert {splits[name] == splits[copy] == own[name] for name, copy in copies.items()} == {True}
     assert any(own[copy] != own[name] for name, copy in copies.items())

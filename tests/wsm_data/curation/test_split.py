@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wsm_data.curation.split import TEST, TRAIN, SplitBy, leaking_scenes, split_of, split_together
+from wsm_data.curation.split import TEST, TRAIN, SplitBy, leaking_scenes, split_together
 from wsm_data.schema.identity import EpisodeId
 
 NAMES = [
@@ -20,6 +20,11 @@ SIGMAS = 4
 FRACTIONS = st.floats(0, 1, exclude_max=True)
 SEEDS = st.integers(0, 1 << 32)
 IDS = st.builds(EpisodeId, *[st.text("abcdefgh_.0123456789", min_size=1).filter(lambda x: x not in (".", ".."))] * 3)
+
+
+def split_of(name, by, test_fraction, seed):
+    """Side of a trajectory whose content is there once."""
+    return split_together({name: "its content"}, by, test_fraction, seed)[name]
 
 
 def deal(names, by=SplitBy.TRAJECTORY, test_fraction=0.05, seed=0):
