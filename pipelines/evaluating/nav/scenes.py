@@ -96,8 +96,8 @@ def _scenes_of_folder(folder: Path) -> list[Scene]:
         match = _NAME.fullmatch(path.parent.name)
         if match is None:
             raise ConfigError(
-                f"{path}: its folder must be named {' or '.join(_MAKERS)}_SEED_INDEX, after what can be generated, "
-                f"found {path.parent.name!r}"
+                f"{path}: its folder must be named {' or '.join(f'{kind}_SEED_INDEX' for kind in _MAKERS)}, after what can "
+                f"be generated, found {path.parent.name!r}"
             )
         found.append(Scene(kind=match[1], seed=int(match[2]), index=int(match[3]), episodes=path))
     return found
