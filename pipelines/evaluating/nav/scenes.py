@@ -95,9 +95,9 @@ def _scenes_of_folder(folder: Path) -> list[Scene]:
     for path in files:
         match = _NAME.fullmatch(path.parent.name)
         if match is None:
+            names = " or ".join(f"{kind}_SEED_INDEX" for kind in _MAKERS)
             raise ConfigError(
-                f"{path}: its folder must be named {' or '.join(f'{kind}_SEED_INDEX' for kind in _MAKERS)}, after what can "
-                f"be generated, found {path.parent.name!r}"
+                f"{path}: its folder must be named {names}, after what can be generated, found {path.parent.name!r}"
             )
         found.append(Scene(kind=match[1], seed=int(match[2]), index=int(match[3]), episodes=path))
     return found

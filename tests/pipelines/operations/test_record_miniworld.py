@@ -12,6 +12,7 @@ from wsm_data.readers.array_episodes import ARRAYS
 from wsm_data.readers.manifest import load_dataset
 from wsm_data.schema.camera import Intrinsics
 from wsm_data.schema.occupancy import FREE, OCCUPIED, OccupancyGrid
+from wsm_data.sim.base import CONTROL_STEP_S
 from wsm_data.sim.config import SimConfig
 
 SIM = SimConfig(intrinsics=Intrinsics(fx=60.0, fy=60.0, cx=39.5, cy=29.5, width=80, height=60))
@@ -45,7 +46,7 @@ def test_drives_that_arrive_become_episodes_with_the_poses_of_the_robots_camera(
         (record,) = ARRAYS.scan(tmp_path, container, dataset, 10).records
         assert record.camera_height_m == pytest.approx(SIM.camera_height_m)
         steps_m = np.linalg.norm(np.diff(record.T_world_camera[:, :3, 3], axis=0), axis=1)
-        assert steps_m.max() <= 0.05 + 1e-9  # 0.5 m/s for 0.1 s
+        assert steps_m.max() <= SIM.max_speed * CONTROL_STEP_S + 1e-9
         assert np.linalg.norm(record.T_world_camera[-1, :2, 3] - record.T_world_camera[0, :2, 3]) > 3
 
 
