@@ -1,10 +1,10 @@
 """`wsm eval`: the evaluations of the paper."""
 
-from pipelines.commands import eval_nav, eval_slam
+from pipelines.commands import eval_nav, eval_slam, eval_table
 from pipelines.commands.command import CommandGroup
 
 GROUP = CommandGroup(
     name="eval",
     summary="Evaluate a planner, a model or another system, as the paper's tables do.",
-    commands=(eval_nav.COMMAND, eval_slam.COMMAND),
+    commands=(eval_nav.COMMAND, eval_slam.COMMAND, eval_table.COMMAND),
 )
