@@ -1,8 +1,8 @@
 """The figures of the paper's tables, and which numbers of a summary stand beside them.
 
 Rates are percent. The paper drives in the benchmark's home and commercial scenes: other worlds are named, and numbers
-of different worlds or protocols are not comparable. Its baselines except LoGoPlanner are point-goal clients, whose goal is
-recomputed from the true pose; the benchmark's controller tracks by the true pose in all rows.
+of different worlds or protocols are not comparable. Its baselines except LoGoPlanner are point-goal clients, whose
+goal is recomputed from the true pose; the benchmark's controller tracks by the true pose in all rows.
 """
 
 from collections.abc import Mapping, Sequence
