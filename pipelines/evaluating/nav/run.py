@@ -15,7 +15,7 @@ from typing import Any
 
 from tqdm import tqdm
 
-from pipelines.evaluating.nav.config import NavConfig, fixed_settings
+from pipelines.evaluating.nav.config import NavConfig, fixed_settings, is_url
 from pipelines.evaluating.nav.drive import Driven, SceneTask, drive_scene, unit_name
 from pipelines.evaluating.nav.results import summarise, write_episodes_table
 from pipelines.evaluating.nav.scenes import Scene, list_scenes
@@ -40,7 +40,7 @@ def evaluate_navigation(
         config: settings.
         out: the folder; it belongs to these settings alone.
         episodes: how many in all; with more of them the same folder goes on.
-        workers: worker processes.
+        workers: worker processes; 1 where the planner is a server.
         films: of the first so many episodes a film is written.
         quiet: no progress bar.
 
@@ -51,6 +51,11 @@ def evaluate_navigation(
         ConfigError: the folder was made with other settings, or they cannot be met.
         IntegrityError: its records are damaged.
     """
+    if is_url(config.planner) and workers > 1:
+        raise ConfigError(
+            f"a server of the protocol keeps one state for all who ask it: --workers must be 1 for {config.planner}, "
+            f"found {workers}"
+        )
     planned = list_scenes(config, episodes)
     with locked(out):
         _claim(out, fixed_settings(config))

@@ -32,10 +32,19 @@ class PaperTable:
     rows: tuple[TableRow, ...]
 
 
-def _driven(system: str, inputs: str, goal: str, *numbers: float) -> tuple[TableRow, TableRow]:
-    """Rows of SR and SPL in home scenes, and of both in commercial ones."""
-    home, commercial = (
-        TableRow(
+def _driven(
+    system: str,
+    inputs: str,
+    goal: str,
+    home_success: float,
+    home_spl: float,
+    commercial_success: float,
+    commercial_spl: float,
+) -> tuple[TableRow, TableRow]:
+    """Rows of home and of commercial scenes."""
+
+    def row(data: str, success: float, spl: float) -> TableRow:
+        return TableRow(
             system=system,
             source="paper",
             data=data,
@@ -45,9 +54,8 @@ def _driven(system: str, inputs: str, goal: str, *numbers: float) -> tuple[Table
             protocol="paper",
             figures={_SUCCESS: Figure(value=success), _SPL: Figure(value=spl)},
         )
-        for data, success, spl in ((_HOME, *numbers[:2]), (_COMMERCIAL, *numbers[2:]))
-    )
-    return home, commercial
+
+    return row(_HOME, home_success, home_spl), row(_COMMERCIAL, commercial_success, commercial_spl)
 
 
 def _mapped(system: str, ate_m: float, accuracy_m: float) -> TableRow:

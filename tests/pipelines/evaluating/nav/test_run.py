@@ -1,14 +1,21 @@
 """An evaluation in its folder: what it writes, how it goes on, what it refuses."""
 
 import json
+import threading
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
 from pipelines.evaluating.nav import run
+from pipelines.evaluating.nav.config import NavConfig
 from pipelines.evaluating.nav.run import evaluate_navigation
 from wsm_data.errors import ConfigError, IntegrityError
+from wsm_data.planners.http.goal_client import GoalClient
+from wsm_data.planners.http.server import PlannerServer, ServerConfig
+from wsm_data.planners.http.service import PlannerService
+from wsm_data.planners.planner import GoalFrame
+from wsm_data.planners.registry import PlannerConfig, make_planner
 from wsm_data.sim.episodes import Episode, write_episodes
 
 
@@ -55,6 +62,45 @@ def test_what_is_done_is_not_done_again_and_more_episodes_go_on(tmp_path, opened
     assert opened == ["home_7_0001"]
     evaluate(make_config(), tmp_path / "whole", 4)
     assert outputs(tmp_path / "out") == outputs(tmp_path / "whole")
+
+
+@pytest.mark.slow
+def test_two_workers_write_the_bytes_of_one(tmp_path):
+    """Real homes, since nothing that a test plants here reaches another process."""
+    config = NavConfig(planner="straight-line", episodes_per_scene=1, seed=7)
+    for workers in (1, 2):
+        evaluate_navigation(config, tmp_path / str(workers), episodes=2, workers=workers, films=0, quiet=True)
+    assert outputs(tmp_path / "1") == outputs(tmp_path / "2")
+
+
+@pytest.fixture
+def straight_line_url():
+    """A server of the straight line for goals that are given anew each time."""
+    planner = make_planner("straight-line", PlannerConfig(goal=GoalFrame.CURRENT))
+    server = PlannerServer(PlannerService(planner, GoalClient.POINT_GOAL), ServerConfig(host="127.0.0.1", port=0))
+    thread = threading.Thread(target=server.serve_forever)
+    thread.start()
+    yield server.url
+    server.shutdown()
+    thread.join()
+    server.server_close()
+
+
+def test_a_planner_behind_a_url_drives_as_it_does_here(tmp_path, opened, make_config, straight_line_url):
+    """The straight line looks at no picture, so what pictures lose on the way does not matter."""
+    here = make_config(goal=GoalFrame.CURRENT)
+    there = make_config(straight_line_url, goal=GoalFrame.CURRENT)
+    evaluate(here, tmp_path / "here")
+    summary = evaluate(there, tmp_path / "there")
+    tables = [pq.read_table(tmp_path / side / "episodes.parquet") for side in ("here", "there")]
+    for column in ("ending", "success", "driven_m", "seconds", "collisions", "plans"):
+        assert tables[0][column].to_pylist() == pytest.approx(tables[1][column].to_pylist())
+    assert (summary["planner"], summary["inputs"]) == ("straight-line", ["depth", "rgb", "goal"])
+
+
+def test_several_workers_may_not_share_the_one_state_of_a_server(tmp_path, make_config):
+    with pytest.raises(ConfigError, match="--workers must be 1 for http://nowhere, found 2"):
+        evaluate_navigation(make_config("http://nowhere"), tmp_path, episodes=4, workers=2, films=0, quiet=True)
 
 
 def test_an_interrupted_evaluation_ends_with_the_bytes_of_an_undisturbed_one(
