@@ -35,7 +35,8 @@ def test_every_option_in_the_documentation_exists(page):
     text = (ROOT / page).read_text()
     options = set(re.findall(r"(?<![\w-])--[a-z][a-z-]+", text))
     commands = ("run", "inspect", "verify", "select", "audit", "audit-run", "bench loader")
-    commands += ("train", "eval nav", "eval slam", "serve", "source describe", "check", "preflight", "audit-latents")
+    commands += ("train", "eval nav", "eval slam", "serve", "source describe", "source miniworld", "check", "preflight")
+    commands += ("audit-latents",)
     helped = "".join(CliRunner().invoke(app, [*command.split(), "--help"]).output for command in commands)
     assert options - {one for one in options if one in helped} == set()
 
