@@ -15,7 +15,9 @@ from wsm_data.readers.frames_digest import ABSENT
 from wsm_data.readers.recorded import Recording, image_size, iter_recorded, scan_recording
 from wsm_data.readers.source import Container, ContainerScan, SourceReader
 from wsm_data.readers.thinning import moving_frames
+from wsm_data.readers.tum.poses import require_rigid
 from wsm_data.readers.unreadable import read_file
+from wsm_data.schema.arrays import require_finite
 from wsm_data.schema.camera import Intrinsics
 from wsm_data.schema.dataset import DatasetManifest
 from wsm_data.schema.episode import EpisodeRecord
@@ -71,6 +73,9 @@ def _read_recording(
         camera, floor, goal = _name(said["camera"]), said["floor_z_m"], said["goal_world_m"]
         goal_world_m = None if goal is None else _point(goal)
         floor_z_m = dataset.motion.floor_z_m if floor is None else float(floor)
+        require_finite("floor_z_m", np.array(floor_z_m or 0.0))
+        if not len(T_world_camera):
+            raise ValueError("T_world_camera must hold a pose, found none")
     except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise DataError(
             Reason.SEQUENCE_UNREADABLE,
@@ -81,6 +86,7 @@ def _read_recording(
         raise DataError(
             Reason.POSE_NOT_FINITE, f"{where}: poses must be finite, that of frame {frame} is not; write it again"
         )
+    require_rigid(T_world_camera, "T_world_camera", where)
     kept = moving_frames(T_world_camera, dataset.motion).tolist()
     recording = Recording(
         container=container,
@@ -105,8 +111,7 @@ def _name(camera: object) -> str:
 
 def _point(numbers: Sequence[float]) -> tuple[float, float, float]:
     x, y, z = (float(number) for number in numbers)
-    if not np.isfinite([x, y, z]).all():
-        raise ValueError(f"goal_world_m must be finite, found {list(numbers)}")
+    require_finite("goal_world_m", np.array([x, y, z]))
     return x, y, z
 
 

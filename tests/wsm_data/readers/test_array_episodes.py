@@ -76,6 +76,24 @@ def test_an_episode_without_depth_gives_records_without_depth(tmp_path, dataset)
     assert set(images.depth) == {None}
 
 
+@pytest.mark.parametrize(
+    ("name", "value", "reason"),
+    [
+        ("floor_z_m", float("nan"), Reason.SEQUENCE_UNREADABLE),
+        ("goal_world_m", [0.0, float("inf"), 0.0], Reason.SEQUENCE_UNREADABLE),
+        ("goal_world_m", [0.0], Reason.SEQUENCE_UNREADABLE),
+        ("T_world_camera", [], Reason.SEQUENCE_UNREADABLE),
+        ("T_world_camera", [[2.0] * 16] * 6, Reason.POSE_NOT_RIGID),
+    ],
+)
+def test_numbers_that_cannot_be_are_a_refusal_of_their_episode(tmp_path, dataset, name, value, reason):
+    folder = write_episode(tmp_path, "kitchen", "one", frames(), K=K, floor_z_m=0.0)
+    said = json.loads((folder / EPISODE_FILE).read_text())
+    (folder / EPISODE_FILE).write_text(json.dumps({**said, name: value}))
+    _, found = scan(tmp_path, dataset)
+    assert [one.reason for one in found.refusals] == [reason]
+
+
 @pytest.mark.parametrize("damage", ["{", "{}", '{"T_world_camera": [1], "K": 2}'])
 def test_a_damaged_episode_is_refused_and_the_other_goes_on(tmp_path, dataset, damage):
     for name in ("one", "two"):
