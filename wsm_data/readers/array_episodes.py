@@ -71,7 +71,7 @@ def _read_recording(
         width, height = image_size(scene, f"{episode}/rgb/000000.png", container)
         intrinsics = Intrinsics(fx=K[0, 0], fy=K[1, 1], cx=K[0, 2], cy=K[1, 2], width=width, height=height)
         camera, floor, goal = _name(said["camera"]), said["floor_z_m"], said["goal_world_m"]
-        goal_world_m = None if goal is None else _point(goal)
+        goal_world_m, with_depth = None if goal is None else _point(goal), bool(said["depth"])
         floor_z_m = dataset.motion.floor_z_m if floor is None else float(floor)
         require_finite("floor_z_m", np.array(floor_z_m or 0.0))
         if not len(T_world_camera):
@@ -94,7 +94,7 @@ def _read_recording(
         scene=container,
         episode=episode,
         rgb=tuple(f"{episode}/rgb/{i:06d}.png" for i in kept),
-        depth=tuple(f"{episode}/depth/{i:06d}.png" if said["depth"] else ABSENT for i in kept),
+        depth=tuple(f"{episode}/depth/{i:06d}.png" if with_depth else ABSENT for i in kept),
         T_world_camera=T_world_camera[kept],
         intrinsics=intrinsics,
         goal_world_m=goal_world_m,

@@ -86,12 +86,22 @@ def test_an_episode_without_depth_gives_records_without_depth(tmp_path, dataset)
         ("T_world_camera", [[2.0] * 16] * 6, Reason.POSE_NOT_RIGID),
     ],
 )
-def test_numbers_that_cannot_be_are_a_refusal_of_their_episode(tmp_path, dataset, name, value, reason):
+def test_values_that_cannot_be_are_a_refusal_of_their_episode(tmp_path, dataset, name, value, reason):
     folder = write_episode(tmp_path, "kitchen", "one", frames(), K=K, floor_z_m=0.0)
     said = json.loads((folder / EPISODE_FILE).read_text())
     (folder / EPISODE_FILE).write_text(json.dumps({**said, name: value}))
     _, found = scan(tmp_path, dataset)
     assert [one.reason for one in found.refusals] == [reason]
+
+
+@pytest.mark.parametrize("name", ["camera", "K", "depth", "floor_z_m", "goal_world_m", "T_world_camera"])
+def test_a_value_that_is_missing_is_a_refusal_of_its_episode(tmp_path, dataset, name):
+    folder = write_episode(tmp_path, "kitchen", "one", frames(), K=K, floor_z_m=0.0)
+    said = json.loads((folder / EPISODE_FILE).read_text())
+    del said[name]
+    (folder / EPISODE_FILE).write_text(json.dumps(said))
+    _, found = scan(tmp_path, dataset)
+    assert [one.reason for one in found.refusals] == [Reason.SEQUENCE_UNREADABLE]
 
 
 @pytest.mark.parametrize("damage", ["{", "{}", '{"T_world_camera": [1], "K": 2}'])
