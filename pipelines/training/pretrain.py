@@ -52,8 +52,19 @@ from wsm_model.training.pretraining import pretraining_step
 from wsm_model.training.schedule import make_optimiser
 from wsm_model.weights.from_wan import load_wan_weights
 
-_NOT_PART_OF_A_RUN = ("checkpoint_every", "keep_checkpoints", "log_every", "sample_every", "micro_rows")
-"""Settings of training that may change between two parts of a run: none of them changes what is learned."""
+_NOT_PART_OF_A_RUN = (
+    "epochs",
+    "max_steps",
+    "checkpoint_every",
+    "keep_checkpoints",
+    "log_every",
+    "sample_every",
+    "micro_rows",
+)
+"""Settings of training that may change between two parts of a run: none of them changes what a step learns.
+
+A run that is to go on for longer follows the schedule of its new length from where it stands.
+"""
 
 
 def run_training(config: TrainRunConfig, out: Path, *, quiet: bool) -> str | None:

@@ -137,7 +137,7 @@ def train(
     steps = total_steps(config, loader)
     rank, _ = rank_and_world_size()
     while done < steps:
-        for batch in loader:
+        for waited_s, batch in _timed(loader):
             started_s = time.perf_counter()
             rate = learning_rate(done, steps, config.optimiser)
             set_learning_rate(run.optimiser, rate)
@@ -147,9 +147,13 @@ def train(
             if rank == 0:
                 hooks.progress(done)
                 if done % config.log_every == 0 or is_last:
-                    seconds = time.perf_counter() - started_s
-                    extra = {"gradient_norm": result.gradient_norm, "learning_rate": rate, "seconds": seconds}
-                    hooks.metrics(done, {**result.losses, **extra})
+                    told = {
+                        "gradient_norm": result.gradient_norm,
+                        "learning_rate": rate,
+                        "seconds": time.perf_counter() - started_s,
+                        "data_wait_seconds": waited_s,
+                    }
+                    hooks.metrics(done, {**result.losses, **told})
             if config.sample_every and done % config.sample_every == 0:
                 hooks.sample(done)
             stops = any_rank(hooks.must_stop())
@@ -166,6 +170,14 @@ def train(
                 break
             if stops:
                 raise Preempted(f"told to end (SIGTERM): {path} holds step {done}; run the same command again to go on")
+
+
+def _timed(loader: BatchSource[BatchT]) -> Iterator[tuple[float, BatchT]]:
+    """Batches, each with the seconds that it was waited for."""
+    asked_s = time.perf_counter()
+    for batch in loader:
+        yield time.perf_counter() - asked_s, batch
+        asked_s = time.perf_counter()
 
 
 def finish_step(

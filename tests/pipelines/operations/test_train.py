@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -95,6 +96,15 @@ def test_the_same_command_again_trains_no_step_more(release, settings, trained):
     assert code == 0, text
     assert [line["step"] for line in lines_of(out)] == [1, 2, 2, 3]
     assert [path.name for path in checkpoints(out / "checkpoints")] == ["step-000002", "step-000003"]
+
+
+def test_a_run_that_is_done_goes_on_where_more_steps_are_asked_for(release, settings, trained, tmp_path):
+    out = tmp_path / "longer"
+    shutil.copytree(trained[0], out)
+    code, text = wsm("train", release, "--out", str(out), "-c", settings, "-s", "training.max_steps=4", "--quiet")
+    assert code == 0, text
+    assert [json.loads(line)["step"] for line in (out / "metrics.jsonl").read_text().splitlines()] == [1, 2, 3, 4]
+    assert load_model(out / "model")[1].steps == 4
 
 
 def test_other_settings_in_the_same_folder_are_refused(release, settings, trained):

@@ -1,5 +1,8 @@
 """The loop with a step that is not pretraining's."""
 
+import time
+from dataclasses import replace
+
 import pytest
 import torch
 
@@ -94,3 +97,28 @@ def test_told_to_end_it_saves_the_step_it_is_at_and_goes_on_to_the_same_bits(tmp
 def test_told_to_end_at_the_last_step_it_has_ended(tmp_path):
     trained(run_of(tmp_path), told_to_end_at=5)
     assert [path.name for path in checkpoints(tmp_path)] == ["step-000004", "step-000005"]
+
+
+def test_a_step_says_how_long_its_data_was_waited_for(tmp_path):
+    """The third batch comes 0.05 s late, and time that a step takes is not waited for."""
+
+    class Late(Numbers):
+        def __iter__(self):
+            for number in super().__iter__():
+                time.sleep(0.05 if number == 3 else 0.0)
+                yield number
+
+    def step(_: int) -> StepResult:
+        time.sleep(0.01)
+        return StepResult(losses={"loss": 0.0}, gradient_norm=0.0)
+
+    waited: dict[int, float] = {}
+    hooks = Hooks(
+        metrics=lambda number, values: waited.update({number: values["data_wait_seconds"]}),
+        sample=lambda _: None,
+        progress=lambda _: None,
+        must_stop=lambda: False,
+    )
+    train(run_of(tmp_path), step, Late(), replace(CONFIG, log_every=1, sample_every=0), hooks=hooks, done=0)
+    assert max(waited, key=waited.__getitem__) == 3
+    assert waited[3] >= 0.05
