@@ -56,10 +56,15 @@ class Reason(StrEnum):
     FRAME_MISSING = "frame.missing"
     FRAME_COUNT_MISMATCH = "frame.count_mismatch"
     FRAME_SIZE_MISMATCH = "frame.size_mismatch"
+    FRAME_REPEATED = "frame.repeated"  # a copy of another, between which the camera moved
+    FRAME_OUT_OF_ORDER = "frame.out_of_order"  # it does not fit between its neighbours
     DEPTH_NOT_16_BIT = "depth.not_16_bit"
     COLOUR_BLANK = "colour.blank"
     COLOUR_DISAGREES = "colour.disagrees"  # colour images do not move as poses and depth images do
     DEPTH_NO_MEASUREMENT = "depth.no_measurement"
+    DEPTH_SPARSE = "depth.sparse"
+    DEPTH_COARSE = "depth.coarse"  # in steps, as of 8 bits in 16
+    DEPTH_NOISY = "depth.noisy"
 
     # the parquet table of an episode
     TABLE_UNREADABLE = "table.unreadable"
@@ -75,6 +80,7 @@ class Reason(StrEnum):
     POSE_DEPTH_DISAGREE = "pose.depth_disagree"
     INTRINSICS_MISFIT = "intrinsics.misfit"
     MOUNT_MISFIT = "mount.misfit"
+    MOUNT_FLOOR_DISAGREE = "mount.floor_disagree"  # depth images see the floor at another height
     FLOOR_UNSEEN = "floor.unseen"  # a camera without a mount, and no floor in its depth
 
     # recorded sequences: lists of images and poses with their times
@@ -96,6 +102,7 @@ class Reason(StrEnum):
     CLOUD_EMPTY = "cloud.empty"
     CLOUD_NO_OBSTACLES = "cloud.no_obstacles"
     CLOUD_DISAGREES = "cloud.disagrees"  # it shows another place than depth images do
+    CLOUD_MISALIGNED = "cloud.misaligned"  # it fits depth images, and clearly better with other poses or another scale
     MAP_TOO_LARGE = "map.too_large"
     PATH_OFF_MAP = "path.off_map"  # the path leads over floor that the cloud never showed
     PATH_THROUGH_OBSTACLE = "path.through_obstacle"

@@ -13,9 +13,9 @@ from pipelines.artifacts.source import IndexedSource, conventions_digest, indexe
 from pipelines.running.stage import Finished, Outcome, Settled, Stage, StageContext, Unit, refused
 from pipelines.running.upstream import done_outcomes, quarantine_of, require_stage, vouched_by_ledger
 from wsm_data.checks.gate import require_kept
-from wsm_data.clips.build import ClipVideos, Provenance, build_clip, measure_quality, read_videos
+from wsm_data.clips.build import ClipVideos, Provenance, build_clip, measure_quality
 from wsm_data.clips.config import ClipConfig
-from wsm_data.clips.episode_gate import episode_verdicts
+from wsm_data.clips.episode_gate import check_episode
 from wsm_data.clips.path_on_floor import lay_path
 from wsm_data.clips.scene_view import SceneView, view_scene
 from wsm_data.codecs.base import VideoCodec
@@ -171,9 +171,9 @@ def _prepare(
         unit = units[record.id.text]
         try:
             laid = lay_path(record, scene_map, source.dataset, config.clip)
-            require_kept(*episode_verdicts(record, frames, scene_map, laid, source.dataset).values())
+            verdicts, videos = check_episode(record, frames, scene_map, laid, source.dataset, config.clip, memory)
+            require_kept(*verdicts.values())
             view = view_scene(record, laid, source.dataset, config.clip)
-            videos = read_videos(record, frames, source.dataset, config.clip, memory)
             yield _Prepared(unit=unit, record=record, view=view, videos=videos)
         except DataError as error:
             yield refused(unit, error)
@@ -241,5 +241,5 @@ def _finish(config: EncodeConfig, context: StageContext, settled: Settled) -> Fi
 
 
 STAGE = Stage(
-    name="encode", version=4, config_type=EncodeConfig, list_units=_list_units, process=_process, finish=_finish
+    name="encode", version=5, config_type=EncodeConfig, list_units=_list_units, process=_process, finish=_finish
 )

@@ -41,7 +41,7 @@ def check_depth_motion(
         max_error: accepted median of |predicted depth / depth there - 1|; see `LIMIT_RATIO`.
     """
     limit = LIMIT_RATIO * max_error
-    told = {step: errors for step in steps if (errors := _errors(record, depth_m, step)) is not None}
+    told = {step: errors for step in steps if (errors := _errors(record, depth_m, step, max_error)) is not None}
     worst = max(told, key=lambda step: told[step][0], default=None)
     measured: dict[str, object] = {"steps": len(told)}
     limits = {"worst_step_error": limit}
@@ -68,14 +68,20 @@ def check_depth_motion(
 
 
 def _errors(
-    record: EpisodeRecord, depth_m: Mapping[int, Float32Array], step: tuple[int, int]
+    record: EpisodeRecord, depth_m: Mapping[int, Float32Array], step: tuple[int, int], max_error: float
 ) -> tuple[float, float] | None:
-    """The quantile of the errors of a step under its poses, and without motion; None where too few points are seen."""
+    """The quantile of the errors of a step under its poses, and without motion; None where too few points are seen.
+
+    Poses that leave nothing to be seen are infinitely wrong where the images stand still.
+    """
     a, b = step
     pair = depth_pair(a, b, depth_m, record.intrinsics, MAX_POINTS)
     T_b_a = invert(record.T_world_camera[b]) @ record.T_world_camera[a]
     own, still = (relative_errors(pair, T, record.intrinsics) for T in (T_b_a, np.eye(4)))
-    return (_quantile(own), _quantile(still)) if np.count_nonzero(np.isfinite(own)) >= MIN_POINTS else None
+    if np.count_nonzero(np.isfinite(own)) >= MIN_POINTS:
+        return _quantile(own), _quantile(still)
+    stands = np.count_nonzero(np.isfinite(still)) >= len(still) / 2 and _quantile(still) <= max_error
+    return (float("inf"), _quantile(still)) if stands else None
 
 
 def _quantile(errors: Float64Array) -> float:

@@ -3,7 +3,7 @@
 import logging
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import chain, pairwise
 
 import numpy as np
@@ -13,7 +13,7 @@ from wsm_data.codecs.depth import depth_m_from_raw
 from wsm_data.codecs.images import depth_codes
 from wsm_data.errors import DataError
 from wsm_data.geometry.transform import invert, rotation_angle_rad
-from wsm_data.schema.arrays import Float32Array, Float64Array
+from wsm_data.schema.arrays import Float32Array, Float64Array, Uint16Array
 from wsm_data.schema.dataset import DatasetManifest
 from wsm_data.schema.episode import EpisodeRecord
 from wsm_data.schema.frames import DepthFrame, EpisodeFrames
@@ -47,11 +47,13 @@ class DepthSamples:
         pairs: frames that are compared, chosen by the way between them.
         steps: frames that are compared, chosen by time; each but the first begins where one before it ends.
         depth_m: by frame, depth along the optical axis, m, 0 without measurement; float32 [H, W].
+        raw_u16: by frame, what it was made of: codes as stored; uint16 [H, W].
     """
 
     pairs: tuple[tuple[int, int], ...]
     steps: tuple[tuple[int, int], ...] = ()
     depth_m: Mapping[int, Float32Array]
+    raw_u16: Mapping[int, Uint16Array] = field(default_factory=dict)
 
 
 def sample_depth(record: EpisodeRecord, frames: EpisodeFrames, dataset: DatasetManifest) -> DepthSamples:
@@ -64,8 +66,9 @@ def sample_depth(record: EpisodeRecord, frames: EpisodeFrames, dataset: DatasetM
     pairs = tuple(spread_pairs(record, sorted(measured)))
     steps = tuple(chained_steps(record, sorted(measured)))
     wanted = sorted({*chain(*pairs, *steps)})
-    depth_m = {number: _depth_m(record, number, measured[number], dataset) for number in wanted}
-    return DepthSamples(pairs=pairs, steps=steps, depth_m=depth_m)
+    raw = {number: depth_codes(measured[number], f"{record.id.text}, depth frame {number}") for number in wanted}
+    depth_m = {number: depth_m_from_raw(codes, dataset.depth) for number, codes in raw.items()}
+    return DepthSamples(pairs=pairs, steps=steps, depth_m=depth_m, raw_u16=raw)
 
 
 def check_samples(record: EpisodeRecord, samples: DepthSamples, dataset: DatasetManifest) -> Verdict:

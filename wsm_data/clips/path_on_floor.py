@@ -20,6 +20,9 @@ from wsm_data.schema.episode import EpisodeRecord
 from wsm_data.schema.occupancy import OccupancyGrid
 from wsm_data.schema.verdict import Verdict
 
+LONGEST_STEP_M = 1.5
+"""A longer step is a leap of the poses, and says nothing about what lies between, m."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class PathOnFloor:
@@ -66,7 +69,9 @@ def _clearance_on_the_way_m(floor: OccupancyGrid, path_xy_m: Float64Array) -> Fl
     A cloud shows the outside of things: who looks at positions alone finds nothing wrong inside of a wide wall.
     """
     ways_m = np.diff(path_xy_m, axis=0)
-    counts = np.maximum(1, np.ceil(np.linalg.norm(ways_m, axis=1) / floor.resolution_m)).astype(np.int64)
+    lengths_m = np.linalg.norm(ways_m, axis=1)
+    pieces = np.where(lengths_m <= LONGEST_STEP_M, np.ceil(lengths_m / floor.resolution_m), 1)
+    counts = np.maximum(1, pieces).astype(np.int64)
     first = np.concatenate([[0], np.cumsum(counts)])
     shares = (np.arange(first[-1]) - np.repeat(first[:-1], counts)) / np.repeat(counts, counts)
     between = np.repeat(path_xy_m[:-1], counts, axis=0) + shares[:, None] * np.repeat(ways_m, counts, axis=0)

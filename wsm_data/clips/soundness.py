@@ -5,9 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from wsm_data.checks.record import check_record
-from wsm_data.clips.build import read_videos
 from wsm_data.clips.config import ClipConfig
-from wsm_data.clips.episode_gate import episode_verdicts
+from wsm_data.clips.episode_gate import check_episode
 from wsm_data.clips.path_on_floor import lay_path
 from wsm_data.clips.scene_surface import scene_surface
 from wsm_data.clips.scene_view import goal_distances, goal_verdicts
@@ -118,21 +117,25 @@ def _check_images(
     for record, frames in reader.iter_frames(checks.source, container, checks.dataset, records):
         verdicts = check_record(record, checks.dataset)
         try:
-            verdicts |= _image_verdicts(record, frames, scene_map, checks, memory)
+            verdicts |= image_verdicts(record, frames, scene_map, checks, memory)
         except DataError as error:
             verdicts["readable"] = Verdict.from_error(error)
         yield _checked(record, verdicts)
 
 
-def _image_verdicts(
+def image_verdicts(
     record: EpisodeRecord, frames: EpisodeFrames, scene_map: SceneMap, checks: SourceChecks, memory: VideoMemory
 ) -> dict[str, Verdict]:
+    """Verdicts of all checks that look at images or at the map of a scene.
+
+    Raises:
+        DataError: a frame does not decode, or path and map are too far apart to be looked at together.
+    """
     dataset = checks.dataset
     laid = lay_path(record, scene_map, dataset, checks.clip)
-    verdicts = episode_verdicts(record, frames, scene_map, laid, dataset)
+    verdicts, _ = check_episode(record, frames, scene_map, laid, dataset, checks.clip, memory)
     _, distance_m = goal_distances(record, laid, dataset, checks.clip)
     verdicts |= goal_verdicts(record, distance_m, checks.clip)
-    read_videos(record, frames, dataset, checks.clip, memory)
     return verdicts
 
 

@@ -33,6 +33,10 @@ class CheckLimits:
             that jitter by 1 cm and 0.5 degrees too; a cloud moved by 0.3 m or more leaves 0.71 at most of one of them.
         min_colour_correlation: least rank correlation of brightness over points that two frames see, median over pairs
             of frames. On generated homes it is 0.92 and more, 0.79 with a Kinect's noise and jittering poses.
+        max_repeated_share: largest share of images that are copies of others between which the camera moved.
+        min_measured_share: least share of the pixels of depth images that are measured.
+        max_depth_step_m: largest step that all depth of a trajectory may be multiples of, m. A Kinect's is 1 mm; 8 bits
+            over 5 m leave 20.
         max_unknown_path_share: largest share of the path over cells of the floor that the scene's cloud never showed.
     """
 
@@ -40,7 +44,7 @@ class CheckLimits:
     max_pitch_up_deg: float = 2.0
     max_pitch_disagreement_deg: float = 3.0
     max_roll_deg: float = 5.0
-    min_jump_m: float = 0.5
+    min_jump_m: float = 0.3
     min_jump_deg: float = 60.0
     max_centre_offset: float = 0.1
     max_field_of_view_deg: float = 130.0
@@ -49,6 +53,9 @@ class CheckLimits:
     min_path_clearance_m: float = 0.10
     min_cloud_share: float = 0.75
     min_colour_correlation: float = 0.6
+    max_repeated_share: float = 0.0
+    min_measured_share: float = 0.25
+    max_depth_step_m: float = 0.005
     max_unknown_path_share: float = 0.5
 
     def __post_init__(self) -> None:

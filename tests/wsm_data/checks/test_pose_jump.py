@@ -50,7 +50,7 @@ def test_large_steps_throughout_are_a_fast_drive_and_no_jump(make_record):
 
 
 def test_a_jump_needs_the_floor_however_still_the_rest_is(make_record):
-    assert check_pose_jump(changed(lambda **f: make_record(step_m=0.001, **f), 20, moved(0.4)), LIMITS).keep
+    assert check_pose_jump(changed(lambda **f: make_record(step_m=0.001, **f), 20, moved(0.25)), LIMITS).keep
 
 
 def test_a_standing_camera_and_a_single_frame_do_not_jump(make_record):

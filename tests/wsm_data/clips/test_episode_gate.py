@@ -7,9 +7,11 @@ import pytest
 from box_room import DATASET, HALL, along_x, cloud_points, frames_of, record_of
 
 from wsm_data.checks.gate import require_kept
+from wsm_data.clips.build import read_videos
 from wsm_data.clips.config import ClipConfig
-from wsm_data.clips.episode_gate import episode_verdicts
+from wsm_data.clips.episode_gate import check_episode
 from wsm_data.clips.path_on_floor import lay_path
+from wsm_data.codecs import images
 from wsm_data.errors import DataError, Reason
 from wsm_data.maps.scene_map import build_scene_map
 from wsm_data.maps.voxels import voxels_from_depth
@@ -17,6 +19,7 @@ from wsm_data.schema.dataset import DatasetManifest
 
 DRIVE = along_x(frames=13, step_m=0.15)
 FRAMES = frames_of(DRIVE)
+CLIP = ClipConfig(width=64, height=32)
 
 
 def scene(offset_m=(0.0, 0.0, 0.0), origin="cloud"):
@@ -26,8 +29,9 @@ def scene(offset_m=(0.0, 0.0, 0.0), origin="cloud"):
 
 def require_sound(record, frames, scene_map, dataset=DATASET):
     loose = replace(dataset, checks=replace(dataset.checks, max_unknown_path_share=1.0, min_path_clearance_m=0.0))
-    laid = lay_path(record, scene_map, loose, ClipConfig())
-    require_kept(*episode_verdicts(record, frames, scene_map, laid, dataset).values())
+    laid = lay_path(record, scene_map, loose, CLIP)
+    verdicts, _ = check_episode(record, frames, scene_map, laid, dataset, CLIP)
+    require_kept(*verdicts.values())
 
 
 def refusal(record=None, frames=FRAMES, scene_map=None, dataset: DatasetManifest = DATASET):
@@ -64,13 +68,21 @@ def test_colour_images_of_something_else_are_refused():
     assert abs(error.details["rank_correlation"]) < 0.2  # of some hundred points that have nothing in common
 
 
-def test_colour_images_of_another_size_than_depth_tell_nothing():
-    small = tuple(np.zeros((24, 32, 3), np.uint8) for _ in FRAMES.rgb)
-    require_sound(record_of(DRIVE), replace(FRAMES, rgb=small), scene(), DATASET)
-
-
 def test_poses_that_stand_still_are_refused():
     poses = DRIVE.T_world_camera
     poses[4:] = poses[4]
     error = refusal(record_of(DRIVE, T_world_camera=poses))
     assert Reason.POSE_MOTION_DISAGREE in {error.reason, *(one["reason"] for one in error.details.get("also", ()))}
+
+
+def test_images_that_were_sampled_are_not_decoded_again_and_give_the_same_videos(monkeypatch):
+    decoded = []
+    decode = images.decode_depth
+    monkeypatch.setattr(images, "decode_depth", lambda *args: decoded.append(1) or decode(*args))
+    scene_map, record = scene(), record_of(DRIVE)
+    laid = lay_path(record, scene_map, DATASET, CLIP)
+    _, videos = check_episode(record, FRAMES, scene_map, laid, DATASET, CLIP)
+    assert len(decoded) == len(FRAMES.depth)
+    plain = read_videos(record, FRAMES, DATASET, CLIP)
+    for one, other in zip(videos.all, plain.all, strict=True):
+        np.testing.assert_array_equal(one, other)
