@@ -49,8 +49,11 @@ MIN_DECIDING_PAIRS = 3
 """in so many pairs, or, in fewer pairs,"""
 
 LARGE_DECIDING_SHARE = 0.1
-"""this share of the points does; poses that are some frames late need it in any case, since with the noise of a Kinect
-and poses that jitter 7 % of the points, at slanted surfaces and edges, prefer them by chance;"""
+"""this share of the points does;"""
+
+CLEAR_ERROR = 2.0
+"""Poses that are some frames late need that share, or that the error of the own ones is so many limits: with a Kinect's
+noise and poses that jitter, 7 % of the points, at slanted surfaces, prefer them by chance and err by one limit;"""
 
 MIN_VOTES = 2 / 3
 """and so large a share of these pairs is for it: the error of one pose is in two pairs at most, a slip is in all."""
@@ -94,7 +97,8 @@ def check_depth_agreement(
     errors = {name: _against(record, poses, compared, own, max_error) for name, poses in meanings.items()}
     for name, poses in _shifted(record.T_world_camera).items():
         found = _against(record, poses, compared, own, max_error)
-        errors[name] = found if found[2] >= LARGE_DECIDING_SHARE else (math.nan, math.nan, 0.0)
+        clear = found[2] >= LARGE_DECIDING_SHARE or found[0] >= CLEAR_ERROR * max_error
+        errors[name] = found if clear else (math.nan, math.nan, 0.0)
     better = {
         name: other
         for name, (mine, other, share) in errors.items()
