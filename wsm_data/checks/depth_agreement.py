@@ -96,9 +96,9 @@ def check_depth_agreement(
     meanings |= _rescaled(record.T_world_camera)
     errors = {name: _against(record, poses, compared, own, max_error) for name, poses in meanings.items()}
     for name, poses in _shifted(record.T_world_camera).items():
-        found = _against(record, poses, compared, own, max_error)
-        clear = found[2] >= LARGE_DECIDING_SHARE or found[0] >= CLEAR_ERROR * max_error
-        errors[name] = found if clear else (math.nan, math.nan, 0.0)
+        mine, other, share = _against(record, poses, compared, own, max_error)
+        clear = share >= LARGE_DECIDING_SHARE or mine >= CLEAR_ERROR * max_error
+        errors[name] = (mine, other, share) if clear else (math.nan, math.nan, 0.0)
     better = {
         name: other
         for name, (mine, other, share) in errors.items()
