@@ -1,21 +1,28 @@
 """A finished release, opened for reading: by path, or by the URL of any store that fsspec knows."""
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pyarrow as pa
 
 from wsm_data.access.clip_reader import read_members
 from wsm_data.access.config import AccessConfig
+from wsm_data.access.notebook import release_html
 from wsm_data.access.open_shards import open_shards
+from wsm_data.access.release_table import release_table
 from wsm_data.access.shard_reader import ShardReader
+from wsm_data.clips.decoded import DecodedVideo, decode_video
+from wsm_data.codecs.base import VideoCodec
 from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.files.digest import sha256_bytes
 from wsm_data.files.stores import LocalStore, Store, open_store
+from wsm_data.schema.arrays import Int64Array
 from wsm_data.schema.clip import Clip
 from wsm_data.schema.codec import CodecInfo
 from wsm_data.shards.clip_bytes import content_of, decode_clip
@@ -25,15 +32,24 @@ from wsm_data.shards.index_row import IndexRow
 from wsm_data.shards.inventory import InventoryRow, parse_inventory, parse_quarantine
 from wsm_data.shards.manifest import ReleaseManifest, parse_manifest
 from wsm_data.shards.names import INDEX_NAME, INVENTORY_NAME, MANIFEST_NAME, QUARANTINE_NAME
+from wsm_data.shards.release_codec import codec_of
+from wsm_data.shards.selection import Selection, read_selection
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from wsm_data.access.clip_dataset import ClipDataset
 
 _HASHED_AT_ONCE_BYTES = 64 << 20
 _PLACES_IN_A_RUN = ("release", "pack/release")
 """Where a release lies in the folder of `wsm pack`, and in that of a run."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Release:
     """A release whose manifest and index agree; clips are read one at a time.
+
+    `len(release)` counts its clips, `release[key]` reads one, and iterating reads them all in the order of the index.
 
     Attributes:
         store: where the files are.
@@ -46,6 +62,128 @@ class Release:
     manifest: ReleaseManifest
     index: IndexTable
     digest: str
+
+    def __repr__(self) -> str:
+        splits = ", ".join(f"{count} {split}" for split, count in self.index.counts("split").items())
+        facts = f"{len(self)} clips ({splits}) of {self.manifest.codec.name}"
+        return f"<Release {self.manifest.name}: {facts}, {self.store.root}>"
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: facts, and the first frame of some clips."""
+        return release_html(self)
+
+    def __len__(self) -> int:
+        return len(self.index)
+
+    def __iter__(self) -> Iterator[Clip]:
+        return (self.read_row(self.index.row_at(number)) for number in range(len(self)))
+
+    def __getitem__(self, key: str) -> Clip:
+        return self.read_clip(key)
+
+    def keys(self, *, split: str = "", selection: str = "") -> list[str]:
+        """Keys of the clips of a split and of a selection, each where it is named, in the order of the index.
+
+        Raises:
+            ConfigError: there is no such split or selection.
+        """
+        [keys] = self.index.values(["key"], self.rows(split=split, selection=selection))
+        return list(keys)
+
+    def rows(self, *, split: str = "", selection: str | Selection = "") -> Int64Array:
+        """Rows of the index of a split and of a selection, each where it is named, ascending; int64 [clips].
+
+        Args:
+            split: name of a split; empty for all.
+            selection: a selection, its name in the release, or the path of its file; empty for all clips.
+
+        Raises:
+            ConfigError: there is no such split or selection, or the selection is of another release.
+            IntegrityError: the selection is damaged, or lists a clip that the release does not have.
+        """
+        is_wanted = self._is_of_split(split)
+        if not selection:
+            return np.flatnonzero(is_wanted)
+        rows = (self.selection(selection) if isinstance(selection, str) else selection).rows_of(self.index)
+        return rows[is_wanted[rows]]
+
+    def selection(self, name: str) -> Selection:
+        """Read a selection of this release by its name in it, or by the path of its file.
+
+        Raises:
+            ConfigError: there is no such selection, or it is of another release.
+            IntegrityError: it is damaged.
+        """
+        return read_selection(self.store, name, self.digest, self.index)
+
+    def to_arrow(self) -> pa.Table:
+        """The index, one row a clip, and behind it the scores where the release has any, by their names.
+
+        Raises:
+            IntegrityError: a table is damaged, or the scores are of other clips.
+        """
+        return release_table(self.store, self.index)
+
+    def to_pandas(self) -> "pd.DataFrame":
+        """As `to_arrow`, with the key as index.
+
+        Raises:
+            ConfigError: pandas is not installed.
+            IntegrityError: as `to_arrow`.
+        """
+        try:
+            return self.to_arrow().to_pandas().set_index("key")
+        except ModuleNotFoundError as error:
+            raise ConfigError("to_pandas needs pandas: pip install pandas, or take to_arrow()") from error
+
+    def codec(self, weights: str = "") -> VideoCodec:
+        """The codec that decodes the release.
+
+        Args:
+            weights: local folder of its weights; empty for a codec without.
+
+        Raises:
+            ConfigError: the codec cannot be built, or these are not the weights of the release.
+        """
+        if weights not in self._codecs:
+            self._codecs[weights] = codec_of(self.manifest, weights)
+        return self._codecs[weights]
+
+    def decode(self, clip: Clip | str, *, frames: Sequence[int] | None = None, weights: str = "") -> DecodedVideo:
+        """Decode a clip to colour (`rgb`, uint8 [T, H, W, 3]) and metric depth (`depth_m`, float32 [T, H, W], m).
+
+        Args:
+            clip: a clip of the release, or its key.
+            frames: raw frames to keep; None: all T, the still frames at the end included.
+            weights: as `codec` takes it.
+
+        Raises:
+            ConfigError: there is no such clip, or it is of another codec, or the codec cannot be built.
+            IndexError: the clip has no such frame.
+        """
+        return decode_video(self[clip] if isinstance(clip, str) else clip, self.codec(weights), frames)
+
+    def dataset(
+        self,
+        *,
+        split: str = "",
+        selection: str = "",
+        transform: Callable[[dict[str, Any]], Any] | None = None,
+    ) -> "ClipDataset":
+        """Some clips as a map-style torch Dataset, for a DataLoader of one's own; needs torch.
+
+        Args:
+            split: name of a split; empty for all.
+            selection: name or path of a selection; empty for all clips.
+            transform: makes of a sample what the dataset gives; called where samples are read. Samples of one shape
+                make batches as they are; clips of different lengths need a transform, or a `collate_fn`.
+
+        Raises:
+            ConfigError: there is no such split or selection.
+        """
+        from wsm_data.access.clip_dataset import ClipDataset  # torch, which nothing else here needs
+
+        return ClipDataset(self.store.root, self.keys(split=split, selection=selection), transform, release=self)
 
     def read_clip(self, key: str) -> Clip:
         """Read one clip with a single ranged read; its arrays are read-only views of the bytes that were read.
@@ -115,6 +253,22 @@ class Release:
         """Every refusal with reason, message and details, sorted by unit."""
         data = checked_file(self.store, QUARANTINE_NAME, self.manifest.quarantine_sha256)
         return parse_quarantine(data, f"{self.store.root}/{QUARANTINE_NAME}")
+
+    @cached_property
+    def _codecs(self) -> dict[str, VideoCodec]:
+        return {}
+
+    def _is_of_split(self, split: str) -> np.ndarray:
+        """For each row of the index, whether it is of the split; bool [rows]."""
+        if not split:
+            return np.ones(len(self.index), np.bool_)
+        codes, splits = self.index.codes("split")
+        if split not in splits:
+            raise ConfigError(
+                f"{self.store.root} must have clips of split {split!r}, found {', '.join(splits) or 'none'}; "
+                "set split to one of them, or to '' for all"
+            )
+        return codes == splits.index(split)
 
     @cached_property
     def shards(self) -> ShardReader:

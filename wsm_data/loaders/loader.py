@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from types import TracebackType
 from typing import Any
 
@@ -12,7 +13,7 @@ from wsm_data.access.shard_reader import ShardReader
 from wsm_data.errors import ConfigError
 from wsm_data.loaders.batches.batch import Batch, BatchBlock
 from wsm_data.loaders.batches.transfer import hand_over, open_transfer
-from wsm_data.loaders.config import LoaderConfig
+from wsm_data.loaders.config import LoaderConfig, OrderConfig, SourceConfig
 from wsm_data.loaders.ledger.writer import LedgerWriter
 from wsm_data.loaders.order.epoch_order import EpochOrder, EpochSummary, rows_per_rank
 from wsm_data.loaders.ranks import place_among_ranks
@@ -40,8 +41,9 @@ class ClipLoader(torch.utils.data.IterableDataset[Batch]):
 
     def __init__(
         self,
-        config: LoaderConfig,
+        config: LoaderConfig | str | Path,
         *,
+        batch: int | None = None,
         rank: int | None = None,
         world_size: int | None = None,
         sources: Sources | None = None,
@@ -49,7 +51,9 @@ class ClipLoader(torch.utils.data.IterableDataset[Batch]):
         """Open the sources; no clip is read yet.
 
         Args:
-            config: what is read, in which order, and how.
+            config: what is read, in which order, and how; or the path or URL of a release, whose clips of the split
+                `train` are then read as the defaults of `LoaderConfig` say.
+            batch: rows of one step over all ranks; only with a path or URL.
             rank: number of this rank; None: that of torch.distributed, 0 where it is not initialised.
             world_size: number of ranks; None: that of torch.distributed, 1 where it is not initialised.
             sources: what stands in for the sources of `config`, made from them, such as queries; None: the clips.
@@ -59,6 +63,7 @@ class ClipLoader(torch.utils.data.IterableDataset[Batch]):
             IntegrityError: a release is unfinished or damaged.
             ValueError: there is no such rank.
         """
+        config = _settings(config, batch)
         self._config = config
         self._rank, self._world_size = place_among_ranks(rank, world_size)
         rows_per_rank(config.order, self._world_size)
@@ -80,6 +85,10 @@ class ClipLoader(torch.utils.data.IterableDataset[Batch]):
     def __reduce__(self) -> tuple[Any, ...]:
         """Cross to another process as settings and a place; what is open stays here."""
         return _reopened, (self._config, self._rank, self._world_size, self._sources, self.state_dict())
+
+    def __len__(self) -> int:
+        """Steps of the current epoch, as `steps`."""
+        return self.steps
 
     @property
     def sources(self) -> Sources:
@@ -254,6 +263,16 @@ class ClipLoader(torch.utils.data.IterableDataset[Batch]):
         identity = {"sources": self._template.sources, "order": self._template.order}
         folder = self._config.ledger
         return LedgerWriter(folder, identity, self._rank, self._world_size) if folder else None
+
+
+def _settings(config: LoaderConfig | str | Path, batch: int | None) -> LoaderConfig:
+    """The settings that were given, or those of the release at a place."""
+    if isinstance(config, LoaderConfig):
+        if batch is not None:
+            raise ConfigError("batch goes with the path of a release; in a LoaderConfig it is order.global_batch")
+        return config
+    order = OrderConfig() if batch is None else OrderConfig(global_batch=batch)
+    return LoaderConfig(sources=(SourceConfig(release=str(config)),), order=order)
 
 
 def _require_fit_for_worker(config: LoaderConfig) -> None:

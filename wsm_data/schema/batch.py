@@ -1,15 +1,37 @@
 """What a loader hands to a model: some clips of one global step, as tensors, and what is known of them."""
 
-from dataclasses import dataclass
-from typing import Generic, TypeVar
+from dataclasses import dataclass, replace
+from typing import Any, Generic, Protocol, Self, TypeVar
 
 from wsm_data.schema.arrays import Int64Array
 from wsm_data.schema.sequence import SequenceSpan
 
-TensorT = TypeVar("TensorT")
+
+class _Tensor(Protocol):
+    """What a batch asks of its tensors, of whatever library."""
+
+    @property
+    def shape(self) -> Any: ...
+
+    def to(self, *args: Any, **options: Any) -> Any: ...
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+TensorT = TypeVar("TensorT", bound=_Tensor)
+
+BATCH_TENSORS = (
+    "rgb",
+    "depth",
+    "depth_valid",
+    "poses",
+    "still",
+    "sequence_id",
+    "latent_index",
+    "goal_camera0_m",
+)
+"""Fields of a batch that are tensors."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class ClipBatch(Generic[TensorT]):
     """What one rank has of one global step: R rows of L latents, in which N sequences lie.
 
@@ -45,3 +67,16 @@ class ClipBatch(Generic[TensorT]):
     step: int
     depth: TensorT | None = None
     depth_valid: TensorT | None = None
+
+    def __repr__(self) -> str:
+        rows, latents, *latent = self.rgb.shape
+        return (
+            f"<ClipBatch epoch {self.epoch} step {self.step}: {len(self.keys)} clips in {rows} rows of {latents} latents "
+            f"{' x '.join(map(str, latent))}>"
+        )
+
+    def to(self, device: Any, *, non_blocking: bool = False) -> Self:
+        """The same batch with its tensors on a device, as torch's `Tensor.to` takes it; dtypes stay."""
+        tensors = {name: tensor for name in BATCH_TENSORS if (tensor := getattr(self, name)) is not None}
+        moved = {name: tensor.to(device, non_blocking=non_blocking) for name, tensor in tensors.items()}
+        return replace(self, **moved)

@@ -17,8 +17,9 @@ from wsm_data.schema.arrays import (
 )
 from wsm_data.schema.camera import Intrinsics
 from wsm_data.schema.clip_meta import ClipMeta
-from wsm_data.schema.pose import IDENTITY_POSE
-from wsm_data.schema.sequence import TEMPORAL_RATIO, frames_of
+from wsm_data.schema.occupancy import OccupancyGrid
+from wsm_data.schema.pose import IDENTITY_POSE, POSE_VALUES
+from wsm_data.schema.sequence import POSE_SLOTS, TEMPORAL_RATIO, frames_of
 
 MEMBERS: Mapping[str, tuple[np.dtype[np.generic], str]] = MappingProxyType(
     {
@@ -41,7 +42,7 @@ UNREACHABLE_MM = 65535
 _QUATERNION_TOLERANCE = 1e-5  # float32 rounding of four numbers of size one
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Clip:
     """One sequence of T = 1 + 4k raw frames and F = 1 + k latent frames.
 
@@ -88,6 +89,13 @@ class Clip:
             raise ValueError(f"meta.frames must be the T = {frames} rows of poses, found {self.meta.frames}")
         _require_poses(self.poses)
 
+    def __repr__(self) -> str:
+        latent, cells = (" x ".join(map(str, shape)) for shape in (self.rgb_latent.shape[1:], self.occupancy.shape))
+        return (
+            f"<Clip {self.meta.key}: {self.frame_count} frames ({self.meta.padded_frames} padded), {self.latent_count} "
+            f"latents {latent} of {self.meta.codec}, map {cells}>"
+        )
+
     @property
     def has_depth(self) -> bool:
         """Whether the source has depth."""
@@ -107,6 +115,18 @@ class Clip:
     def intrinsics(self) -> Intrinsics:
         """Camera at the size the latents decode to."""
         return self.meta.intrinsics
+
+    @property
+    def grid(self) -> OccupancyGrid:
+        """The clip's crop of its scene's map, with its place in the world."""
+        meta = self.meta
+        return OccupancyGrid(cells=self.occupancy, origin_cell=meta.map_origin_cell, resolution_m=meta.map_resolution_m)
+
+    @property
+    def latent_poses(self) -> Float32Array:
+        """Poses of the raw frames of each latent, as a batch has them; float32 [F, 4, 7], latent 0 four identities."""
+        first = np.tile(np.array(IDENTITY_POSE, np.float32), (POSE_SLOTS - 1, 1))
+        return np.concatenate([first, self.poses]).reshape(self.latent_count, POSE_SLOTS, POSE_VALUES)
 
     def arrays(self) -> dict[str, np.ndarray]:
         """The array members that are there, by name, in stored order."""

@@ -21,7 +21,6 @@ from wsm_data.loaders.order.pass_order import SourceLayout
 from wsm_data.schema.arrays import Int64Array
 from wsm_data.shards.index_row import IndexRow
 from wsm_data.shards.names import TRAIN_SPLIT
-from wsm_data.shards.selection import read_selection
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -211,29 +210,13 @@ def require_depth(sources: Sources) -> None:
 
 
 def _open_source(config: SourceConfig, release: Release, base: int) -> SourceTable:
-    is_chosen = _is_of_split(config, release)
-    rows, selection = np.flatnonzero(is_chosen), ""
-    if config.selection:
-        chosen = read_selection(release.store, config.selection, release.digest, release.index)
-        rows, selection = chosen.rows_of(release.index), chosen.name
-        rows = rows[is_chosen[rows]]
+    chosen = release.selection(config.selection) if config.selection else None
+    name = chosen.name if chosen else ""
+    rows = release.rows(split=config.split, selection=chosen or "")
     if not len(rows):
-        wanted = f"split {config.split or 'any'}" + (f" and selection {selection}" if selection else "")
+        wanted = f"split {config.split or 'any'}" + (f" and selection {name}" if name else "")
         raise ConfigError(f"a source must have clips, but {config.release} has none of {wanted}")
-    return SourceTable(config=config, release=release, selection=selection, rows=rows, base=base)
-
-
-def _is_of_split(config: SourceConfig, release: Release) -> np.ndarray:
-    """For each row of the index, whether it is of the split of the source; bool [rows]."""
-    if not config.split:
-        return np.ones(len(release.index), np.bool_)
-    codes, splits = release.index.codes("split")
-    if config.split not in splits:
-        raise ConfigError(
-            f"{release.store.root} must have clips of split {config.split!r}, found {', '.join(splits) or 'none'}; "
-            "set split to one of them, or to '' for all"
-        )
-    return codes == splits.index(config.split)
+    return SourceTable(config=config, release=release, selection=name, rows=rows, base=base)
 
 
 def _require_alike(first: Release, other: Release) -> None:

@@ -58,7 +58,7 @@ class ClipFacts:
 def clip_facts(clip: Clip) -> ClipFacts:
     """Measure one clip."""
     meta, path_xy_m = clip.meta, world_path_m(clip)[:, :2]
-    clearance_m = path_clearance_m(clip_grid(clip), path_xy_m)
+    clearance_m = path_clearance_m(clip.grid, path_xy_m)
     return ClipFacts(
         key=meta.key,
         frames=moving_frames(clip),
@@ -86,12 +86,6 @@ def world_path_m(clip: Clip) -> Float64Array:
     """Camera positions in the world, m, padding left out; float64 [T - padded, 3]."""
     positions = clip.poses[: moving_frames(clip), :3].astype(np.float64)
     return transform_points(clip.meta.T_world_camera0_matrix, positions)
-
-
-def clip_grid(clip: Clip) -> OccupancyGrid:
-    """The clip's crop of its scene's map."""
-    meta = clip.meta
-    return OccupancyGrid(cells=clip.occupancy, origin_cell=meta.map_origin_cell, resolution_m=meta.map_resolution_m)
 
 
 def clip_field_m(clip: Clip) -> Float64Array:

@@ -14,7 +14,7 @@ from wsm_data.schema.arrays import Float64Array, Uint8Array
 from wsm_data.schema.clip import Clip
 from wsm_data.schema.occupancy import FREE, OCCUPIED, OccupancyGrid
 from wsm_data.shards.names import TRAIN_SPLIT
-from wsm_data.view.clip.facts import clip_field_m, clip_grid, world_path_m
+from wsm_data.view.clip.facts import clip_field_m, world_path_m
 from wsm_data.view.clip.scene_overview import SceneOverview
 
 FREE_COLOUR = "#ffffff"
@@ -115,7 +115,7 @@ def draw_clip_map(axes: Axes, clip: Clip) -> None:
     meta = clip.meta
     draw_map(
         axes,
-        clip_grid(clip),
+        clip.grid,
         clip_field_m(clip),
         world_path_m(clip)[:, :2],
         goal_xy_m=meta.goal_world_m[:2],

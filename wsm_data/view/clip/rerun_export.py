@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from wsm_data.clips.decoded import DecodedVideo, decode_video
 from wsm_data.codecs.base import VideoCodec
 from wsm_data.errors import ConfigError
 from wsm_data.files.atomic import write_bytes
@@ -26,9 +27,8 @@ from wsm_data.geometry.transform import transforms_from_vectors
 from wsm_data.schema.arrays import Float64Array
 from wsm_data.schema.clip import Clip
 from wsm_data.schema.occupancy import UNKNOWN
-from wsm_data.view.clip.facts import clip_field_m, clip_grid, moving_frames, world_path_m
+from wsm_data.view.clip.facts import clip_field_m, moving_frames, world_path_m
 from wsm_data.view.clip.map_plot import GOAL_COLOUR, PATH_COLOUR, UNKNOWN_COLOUR, cell_picture
-from wsm_data.view.clip.pictures import DecodedFrames, decode_frames
 from wsm_data.view.clip.text import describe_clip
 
 TIMELINE = "frame"
@@ -56,7 +56,7 @@ def write_rerun(clip: Clip, codec: VideoCodec, path: Path) -> None:
         ConfigError: rerun is not installed or switched off, or the clip was encoded with another codec.
     """
     rr = _import_rerun()
-    decoded = decode_frames(clip, codec, range(moving_frames(clip)))
+    decoded = decode_video(clip, codec, range(moving_frames(clip)))
     with TemporaryDirectory() as folder, _strict(rr):
         saved = Path(folder) / "clip.rrd"
         stream = rr.RecordingStream(_APPLICATION, recording_id=digest_json(to_json(clip.meta)))
@@ -96,12 +96,12 @@ def _image_formats(rr: ModuleType, clip: Clip) -> dict[str, Any]:
     }
 
 
-def _images(rr: ModuleType, decoded: DecodedFrames) -> dict[str, tuple[int, Any]]:
+def _images(rr: ModuleType, decoded: DecodedVideo) -> dict[str, tuple[int, Any]]:
     """What the latents decode to: entity path to first frame and columns."""
     count = len(decoded.frames)
     depth_m = np.where(decoded.measured, decoded.depth_m, np.float32(0)).astype("<f4")
     return {
-        f"{_PINHOLE}/rgb": (0, rr.Image.columns(buffer=decoded.rgb_u8.reshape(count, -1))),
+        f"{_PINHOLE}/rgb": (0, rr.Image.columns(buffer=decoded.rgb.reshape(count, -1))),
         f"{_PINHOLE}/depth": (0, rr.DepthImage.columns(buffer=depth_m.reshape(count, -1).view(np.uint8))),
     }
 
@@ -126,7 +126,7 @@ def _poses_and_curves(rr: ModuleType, clip: Clip) -> dict[str, tuple[int, Any]]:
 
 def _map_mesh(rr: ModuleType, clip: Clip) -> Any:
     """The crop of the map as one textured rectangle on the floor; row 0 of the picture is at the smallest y."""
-    grid = clip_grid(clip)
+    grid = clip.grid
     picture = cell_picture(grid, clip_field_m(clip))[..., :3].copy()
     picture[grid.cells == UNKNOWN] = _rgb(UNKNOWN_COLOUR)
     corners = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])

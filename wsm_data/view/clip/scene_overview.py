@@ -8,7 +8,7 @@ import numpy as np
 from wsm_data.schema.arrays import Float64Array
 from wsm_data.schema.clip import Clip
 from wsm_data.schema.occupancy import OCCUPIED, UNKNOWN, OccupancyGrid
-from wsm_data.view.clip.facts import clip_grid, world_path_m
+from wsm_data.view.clip.facts import world_path_m
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,7 +46,7 @@ class SceneOverview:
 
 def scene_path(clip: Clip, split: str) -> ScenePath:
     """Take from a clip what the picture of its scene needs."""
-    return ScenePath(key=clip.meta.key, split=split, grid=clip_grid(clip), path_xy_m=world_path_m(clip)[:, :2])
+    return ScenePath(key=clip.meta.key, split=split, grid=clip.grid, path_xy_m=world_path_m(clip)[:, :2])
 
 
 def scene_overview(scene: str, paths: Sequence[ScenePath]) -> SceneOverview:

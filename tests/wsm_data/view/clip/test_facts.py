@@ -7,7 +7,6 @@ from wsm_data.schema.occupancy import OccupancyGrid
 from wsm_data.view.clip.facts import (
     clip_facts,
     clip_field_m,
-    clip_grid,
     depth_valid_share,
     moving_frames,
     path_clearance_m,
@@ -64,7 +63,7 @@ def test_unreachable_cells_have_no_distance(clip):
 
 
 def test_the_grid_of_a_clip_is_where_its_meta_data_says(clip, made):
-    grid = clip_grid(clip)
+    grid = clip.grid
     assert grid.origin_xy_m == pytest.approx((-0.5, 1.0))
     assert np.array_equal(grid.cells, clip.occupancy)
 

@@ -8,9 +8,9 @@ import pytest
 import rerun as rr
 from rerun.chunk import RrdReader
 
+from wsm_data.clips.decoded import decode_video
 from wsm_data.errors import ConfigError
 from wsm_data.schema.clip import Clip
-from wsm_data.view.clip.pictures import decode_frames
 from wsm_data.view.clip.rerun_export import write_rerun
 from wsm_data.view.clip.text import describe_clip
 
@@ -93,10 +93,10 @@ def test_the_pinhole_has_the_intrinsics_of_the_clip(recording, turned):
 
 
 def test_pictures_are_what_the_latents_decode_to(recording, turned, made):
-    decoded = decode_frames(turned, made.codec, FRAMES)
+    decoded = decode_video(turned, made.codec, FRAMES)
     for frame in FRAMES:
         seen = values(recording, f"{PINHOLE}/rgb Image:buffer", frame).astype(np.uint8).reshape(32, 64, 3)
-        np.testing.assert_array_equal(seen, decoded.rgb_u8[frame])
+        np.testing.assert_array_equal(seen, decoded.rgb[frame])
 
 
 def depth_m(recording, frame):
