@@ -25,7 +25,13 @@ SLOW_IMPORTS = {"torch", "cv2", "numba", "matplotlib", "diffusers", "trimesh"}
 PICKLES = {"pickle", "cPickle", "_pickle", "dill", "cloudpickle", "shelve", "marshal", "joblib"}
 
 ONLY_IMPORTED_IN = {
-    "torch": ("wsm_data/codecs/wan.py", "wsm_data/loaders/", "wsm_model/", "pipelines/"),
+    "torch": (
+        "wsm_data/access/clip_dataset.py",
+        "wsm_data/codecs/wan.py",
+        "wsm_data/loaders/",
+        "wsm_model/",
+        "pipelines/",
+    ),
     "diffusers": ("wsm_data/codecs/wan.py", "wsm_model/"),
     "matplotlib": ("wsm_data/view/",),
     "jinja2": ("wsm_data/view/",),

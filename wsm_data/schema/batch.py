@@ -70,10 +70,9 @@ class ClipBatch(Generic[TensorT]):
 
     def __repr__(self) -> str:
         rows, latents, *latent = self.rgb.shape
-        return (
-            f"<ClipBatch epoch {self.epoch} step {self.step}: {len(self.keys)} clips in {rows} rows of {latents} latents "
-            f"{' x '.join(map(str, latent))}>"
-        )
+        place = f"epoch {self.epoch} step {self.step}"
+        sizes = f"{len(self.keys)} clips in {rows} rows of {latents} latents {' x '.join(map(str, latent))}"
+        return f"<ClipBatch {place}: {sizes}>"
 
     def to(self, device: Any, *, non_blocking: bool = False) -> Self:
         """The same batch with its tensors on a device, as torch's `Tensor.to` takes it; dtypes stay."""

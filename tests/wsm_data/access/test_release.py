@@ -190,3 +190,29 @@ def test_the_snippets_of_the_documentation_run_beside_a_release(
     assert len(snippets) == 4
     for number, snippet in enumerate(snippets):
         exec(compile(snippet, f"docs/format.md, snippet {number}", "exec"), {})  # noqa: S102 - our own document
+
+
+def test_a_release_has_a_length_items_and_an_order(tiny: SimpleNamespace) -> None:
+    release = open_release(tiny.folder)
+    assert len(release) == len(tiny.clips) == 7
+    assert [clip.meta.key for clip in release] == release.keys() == release.index.texts("key")
+    assert release[release.keys()[3]].meta.key == release.keys()[3]
+    assert sorted(key for split in release.index.counts("split") for key in release.keys(split=split)) == sorted(
+        release.keys()
+    )
+
+
+def test_a_release_and_its_clips_are_shown_in_a_line(tiny: SimpleNamespace) -> None:
+    release = open_release(tiny.folder)
+    assert repr(release).startswith(f"<Release {release.manifest.name}: 7 clips (")
+    assert max(len(repr(clip)) for clip in release) < 200
+
+
+def test_a_clip_is_decoded_by_its_key_to_what_its_codec_decodes(homes_release: Path) -> None:
+    release = open_release(homes_release)
+    clip = next(iter(release))
+    decoded = release.decode(clip.meta.key)
+    assert decoded.rgb.shape == (clip.frame_count, clip.intrinsics.height, clip.intrinsics.width, 3)
+    assert decoded.depth_m.shape == decoded.rgb.shape[:3]
+    video = release.codec().decode(clip.rgb_latent.astype(np.float32))
+    assert np.abs(decoded.rgb / 127.5 - 1 - video.clip(-1, 1)).max() < 1 / 127.5  # one step of 256

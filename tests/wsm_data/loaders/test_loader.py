@@ -259,3 +259,21 @@ def test_no_file_of_a_closed_loader_stays_open(released, make_loader, tmp_path):
     assert _open_below(folder)
     loader.close()
     assert _open_below(folder) == set()
+
+
+def test_the_place_of_a_release_is_enough(released):
+    loader = ClipLoader(released.folder, batch=3)
+    batches = list(loader)
+    assert len(batches) == len(loader) > 0
+    assert {len(batch.rgb) for batch in batches} == {3}
+    assert "clips in 3 rows" in repr(batches[0])
+    with pytest.raises(ConfigError, match="batch goes with the path"):
+        ClipLoader(LoaderConfig(sources=(SourceConfig(release=str(released.folder)),)), batch=3)
+
+
+def test_a_batch_goes_to_a_device_with_all_its_tensors(make_loader):
+    batch = next(iter(make_loader()))
+    moved = batch.to("meta")
+    assert {moved.rgb.device.type, moved.goal_camera0_m.device.type, moved.depth_valid.device.type} == {"meta"}
+    assert moved.keys == batch.keys
+    assert moved.rgb.shape == batch.rgb.shape

@@ -136,3 +136,17 @@ def test_depth_is_there_with_its_validity_or_not_at_all(clip_fields):
     assert list(bare.arrays()) == [name for name in MEMBERS if name not in DEPTH_MEMBERS]
     with pytest.raises(ValueError, match="must be there both, or neither"):
         Clip(**{**clip_fields, "depth_valid": None})
+
+
+def test_the_poses_of_a_latent_are_those_of_its_raw_frames(clip_fields):
+    clip = Clip(**clip_fields)
+    poses = clip.latent_poses
+    assert poses.shape == (3, 4, 7)
+    np.testing.assert_array_equal(poses[0], np.tile(clip.poses[0], (4, 1)))  # the identity, four times
+    np.testing.assert_array_equal(poses[1:].reshape(8, 7), clip.poses[1:])
+
+
+def test_the_map_of_a_clip_stands_in_the_world(clip_fields):
+    clip = Clip(**{**clip_fields, "meta": replace(clip_fields["meta"], map_origin_cell=(-4, 7))})
+    assert clip.grid.origin_xy_m == (-4 * clip.meta.map_resolution_m, 7 * clip.meta.map_resolution_m)
+    np.testing.assert_array_equal(clip.grid.cells, clip.occupancy)

@@ -78,7 +78,7 @@ def test_what_is_no_json_object_is_refused(data):
 @pytest.mark.parametrize(
     ("field", "value", "message"),
     [
-        ("map_from", "guess", "^map_from must be 'cloud' or 'depth', found 'guess'"),
+        ("map_from", "guess", "^map_from must be 'cloud', 'depth' or 'path', found 'guess'"),
         ("padded_frames", -1, r"^padded_frames must lie in \[0, frames = 9\), found -1"),
         ("padded_frames", 9, r"^padded_frames must lie in \[0, frames = 9\), found 9"),
         ("T_world_camera0", ((1.0, 0.0, 0.0, 0.0),) * 3, "^T_world_camera0 must be 4 x 4"),

@@ -44,7 +44,7 @@ def test_the_marks_must_be_as_many_as_the_boxes():
 
 
 def test_an_unknown_origin_is_refused():
-    with pytest.raises(ValueError, match=r"^origin must be 'cloud' or 'depth', found 'mesh'"):
+    with pytest.raises(ValueError, match=r"^origin must be 'cloud', 'depth' or 'path', found 'mesh'"):
         surface([(0, 0, 0)], origin="mesh")
 
 
