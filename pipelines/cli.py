@@ -27,6 +27,7 @@ COMMANDS: tuple[Command | CommandGroup, ...] = (
     *stages.COMMANDS,
     run.RUN_COMMAND,
     run.DEMO_COMMAND,
+    run.STATUS_COMMAND,
     inspect.COMMAND,
     audit_run.COMMAND,
     audit.COMMAND,

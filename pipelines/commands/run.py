@@ -1,5 +1,6 @@
-"""`wsm run` and `wsm demo`: the stages of a recipe, in one run folder."""
+"""`wsm run` and `wsm demo`: the stages of a recipe, in one run folder; `wsm status`: where it stands."""
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -51,6 +52,17 @@ def run_demo(request: StageRequest) -> None:
     _run("demo", request)
 
 
+def status(
+    run: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run, or of one stage.")],
+    as_json: Annotated[bool, typer.Option("--json", help="Print one line of JSON in place of the table.")] = False,
+    watch: Annotated[bool, typer.Option("--watch", help="Print it again every two seconds, until Ctrl-C.")] = False,
+) -> None:
+    """Show where a run stands, while it runs or afterwards."""
+    from pipelines.operations.status import show_status
+
+    show_status(run, as_json, watch)
+
+
 def _run(recipe: str, request: StageRequest) -> None:
     from pipelines.operations.run_recipe import run_recipe as work
 
@@ -66,3 +78,6 @@ RUN_COMMAND = Command(
     name="run", summary="Run the stages of a recipe into one run folder.", call=run_recipe, epilog=_recipe_list()
 )
 DEMO_COMMAND = Command(name="demo", summary="The main job, end to end, on generated data.", call=filling(run_demo))
+STATUS_COMMAND = Command(
+    name="status", summary="Show where the stages of a run stand, while it runs or afterwards.", call=status
+)

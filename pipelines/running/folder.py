@@ -14,7 +14,7 @@ from wsm_data.files.digest import xxh3_128_file
 from wsm_data.files.json_values import from_json
 from wsm_data.files.sealed import sealed, unsealed
 
-STAGE_FILE = "stage.json"
+STAGE_FILE, LOCK_FILE = "stage.json", ".lock"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,7 +107,7 @@ def locked(folder: Path) -> Iterator[None]:
 def _lock_file(folder: Path) -> TextIO:
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        return (folder / ".lock").open("w")
+        return (folder / LOCK_FILE).open("w")
     except OSError as error:
         if is_full_disk(error):  # no fault of the request
             raise

@@ -31,7 +31,7 @@ from pipelines.running.options import RunOptions
 from pipelines.running.quarantine import PENDING_FILE, QUARANTINE_FILE, write_pending, write_quarantine
 from pipelines.running.settings import config_json, settings_of
 from pipelines.running.stage import REFUSED, ConfigT, Finished, Outcome, Settled, Stage, StageContext, Unit, refused
-from pipelines.running.stage_report import StageReport, stage_report
+from pipelines.running.stage_report import StageReport, beyond_outcomes, stage_report
 from pipelines.running.upstream import pending_units, quarantine_of, upstream_records
 from wsm_data.errors import BudgetExceeded, ConfigError, DataError, WsmError
 from wsm_data.files.atomic import remove_temporaries
@@ -125,8 +125,7 @@ def run_stage(
 
 def _report(job: _Job[ConfigT], ran: Sequence[Unit], seconds: float) -> StageReport:
     settled = job.settled()
-    known = {(one.unit, one.source, one.reason) for outcome in settled.outcomes.values() for one in outcome.refusals}
-    extra = [one for one in quarantine_of(job.out) if (one.unit, one.source, one.reason) not in known]
+    extra = beyond_outcomes(settled, quarantine_of(job.out))
     report = stage_report(job.stage.name, job.out, settled, [unit.id for unit in ran], seconds, extra)
     return replace(report, waits_for=job.waits_for)
 

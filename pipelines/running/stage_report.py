@@ -71,6 +71,12 @@ def stage_report(
     )
 
 
+def beyond_outcomes(settled: Settled, refusals: Sequence[Refusal]) -> list[Refusal]:
+    """Those refusals that belong to no outcome: what the end of the stage refused."""
+    known = {(one.unit, one.source, one.reason) for outcome in settled.outcomes.values() for one in outcome.refusals}
+    return [one for one in refusals if (one.unit, one.source, one.reason) not in known]
+
+
 def summary_table(reports: Sequence[StageReport]) -> str:
     """The reports as an aligned table, refusals by reason below."""
     header = ("stage", "units", "ran", "done", "refused", "pending", "seconds", "facts")
