@@ -11,6 +11,7 @@ import typer
 from typer.core import TyperGroup
 
 from pipelines.commands import audit, audit_run, bench, evaluate, inspect, run, serve, source, stages, train
+from pipelines.commands.clips import film
 from pipelines.commands.command import Command, CommandGroup
 from pipelines.commands.soundness import audit_latents, check, preflight
 from pipelines.running.interrupts import (
@@ -29,6 +30,7 @@ COMMANDS: tuple[Command | CommandGroup, ...] = (
     run.DEMO_COMMAND,
     run.STATUS_COMMAND,
     inspect.COMMAND,
+    film.COMMAND,
     audit_run.COMMAND,
     audit.COMMAND,
     train.COMMAND,

@@ -30,7 +30,7 @@ def inspect_release(
     if key is None:
         _list_clips(release, limit)
         return
-    clip = release.read_clip(_key(release, key))
+    clip = release.read_clip(find_key(release, key))
     typer.echo(describe_clip(clip))
     codec = codec_of(release.manifest, weights)  # after the text, which needs no weights
     if rerun:
@@ -42,16 +42,7 @@ def inspect_release(
         typer.echo(f"contact sheet: {path}")
 
 
-def _list_clips(release: Release, limit: int) -> None:
-    typer.echo(describe_release(release))
-    keys = sorted(release.index.texts("key"))
-    shown = keys[:limit] if limit else keys
-    typer.echo("\nclips\n" + "\n".join(f"  {one}" for one in shown))
-    if len(shown) < len(keys):
-        typer.echo(f"  and {len(keys) - len(shown)} more; --limit 0 lists all")
-
-
-def _key(release: Release, text: str) -> str:
+def find_key(release: Release, text: str) -> str:
     """A clip's key, given as key or as the id of its trajectory; what is neither stays as it is."""
     if text in release.index.texts("key"):
         return text
@@ -59,3 +50,12 @@ def _key(release: Release, text: str) -> str:
         return EpisodeId.parse(text).key
     except ValueError:
         return text
+
+
+def _list_clips(release: Release, limit: int) -> None:
+    typer.echo(describe_release(release))
+    keys = sorted(release.index.texts("key"))
+    shown = keys[:limit] if limit else keys
+    typer.echo("\nclips\n" + "\n".join(f"  {one}" for one in shown))
+    if len(shown) < len(keys):
+        typer.echo(f"  and {len(keys) - len(shown)} more; --limit 0 lists all")

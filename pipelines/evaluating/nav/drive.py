@@ -144,7 +144,7 @@ def _film_frames(
         distance = float(np.linalg.norm(pose[:2] - rollout.episode.goal_xy_m))
         yield FilmFrame(
             seen_u8=world.render(camera_over(pose, config.sim.camera_height_m))[0],
-            dreamed_u8=None if dream is None else dream[min(step - begun, len(dream) - 1)],
+            beside_u8=None if dream is None else dream[min(step - begun, len(dream) - 1)],
             true_m=rollout.poses[: step + 1, :2],
             estimated_m=_estimates(rollout, step),
             caption=(

@@ -82,6 +82,22 @@ def test_a_clip_is_found_by_its_key_and_by_the_id_of_its_trajectory(release, cap
     assert cv2.imread(str(tmp_path / "sheet.png")).shape[1] == 1600
 
 
+@pytest.mark.parametrize("name", [KEYS[1], f"{SCENE}/000001"])
+def test_a_film_of_a_clip_is_written_where_it_is_asked_for(release, capsys, tmp_path, name):
+    path = tmp_path / "clip.mp4"
+    app(["film", str(release), name, "--out", str(path)], standalone_mode=False)
+    assert capsys.readouterr().out == f"film: {path}, 5 frames\n"
+    assert cv2.VideoCapture(str(path)).get(cv2.CAP_PROP_FRAME_COUNT) == 5
+
+
+def test_a_film_that_would_be_no_mp4_is_a_wrong_request(release, capsys, tmp_path):
+    with pytest.raises(SystemExit) as stopped:
+        app(["film", str(release), KEYS[0], "--out", str(tmp_path / "clip.avi")])
+    assert stopped.value.code == 2
+    assert "ends in .mp4" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_without_a_name_the_sheet_is_called_after_its_clip(release, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     inspect(release, key=KEYS[0])

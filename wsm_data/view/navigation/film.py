@@ -1,4 +1,4 @@
-"""A film of one episode: what the robot sees, what it dreams, and where it is and believes to be."""
+"""A film of one episode or clip: what is seen, a second picture beside it, and the way on the map below."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -23,18 +23,19 @@ _SHIFT = 4  # bits of a fraction of a pixel
 
 @dataclass(frozen=True, kw_only=True)
 class FilmFrame:
-    """One control step.
+    """One control step, or one frame of a clip.
 
     Attributes:
         seen_u8: what the camera shows; uint8 [H, W, 3].
-        dreamed_u8: what the planner expects to see, any size; None where it dreams nothing.
+        beside_u8: what stands beside it, any size: what the planner expects to see, or depth in colours; None where
+            there is none.
         true_m: where the robot has been until now, world; float64 [N, 2], m.
-        estimated_m: where it believed to be, likewise; float64 [M, 2], M may be 0.
+        estimated_m: where it believed to be; float64 [M, 2], M may be 0.
         caption: lines of text.
     """
 
     seen_u8: Uint8Array
-    dreamed_u8: Uint8Array | None
+    beside_u8: Uint8Array | None
     true_m: Float64Array
     estimated_m: Float64Array
     caption: tuple[str, ...]
@@ -76,12 +77,9 @@ def write_film(path: Path, grid: OccupancyGrid, goal_m: Float64Array, frames: It
 
 
 def film_picture(background: Uint8Array, grid: OccupancyGrid, goal_m: Float64Array, frame: FilmFrame) -> Uint8Array:
-    """One picture of a film, uint8 [720, 960, 3]: what is seen, what is dreamed, and the map below."""
-    seen = cv2.resize(frame.seen_u8, _PICTURE_PX, interpolation=cv2.INTER_AREA)
-    if frame.dreamed_u8 is None:
-        dreamed = np.full_like(seen, _UNKNOWN)
-    else:
-        dreamed = cv2.resize(frame.dreamed_u8, _PICTURE_PX, interpolation=cv2.INTER_LINEAR)
+    """One picture of a film, uint8 [720, 960, 3]: what is seen, what stands beside it, the map below."""
+    seen = _fitted(frame.seen_u8)
+    beside = np.full_like(seen, _UNKNOWN) if frame.beside_u8 is None else _fitted(frame.beside_u8)
     map_u8 = background.copy()
     for points, colour in ((frame.true_m, _TRUE), (frame.estimated_m, _ESTIMATED)):
         if len(points):
@@ -91,7 +89,19 @@ def film_picture(background: Uint8Array, grid: OccupancyGrid, goal_m: Float64Arr
     cv2.circle(map_u8, tuple(np.round(_pixels(grid, goal_m[None])[0]).astype(int).tolist()), 7, _GOAL, 3, cv2.LINE_AA)
     for line, text in enumerate(frame.caption):
         cv2.putText(map_u8, text, (10, 20 * (line + 1)), cv2.FONT_HERSHEY_SIMPLEX, 0.5, _INK, 1, cv2.LINE_AA)
-    return np.concatenate([np.concatenate([seen, dreamed], axis=1), map_u8])
+    return np.concatenate([np.concatenate([seen, beside], axis=1), map_u8])
+
+
+def _fitted(picture_u8: Uint8Array) -> Uint8Array:
+    """A picture as large as its place allows, in the middle of it; its sides keep their ratio."""
+    height, width = picture_u8.shape[:2]
+    scale = min(_PICTURE_PX[0] / width, _PICTURE_PX[1] / height)
+    size = round(scale * width), round(scale * height)
+    method = cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR
+    left, top = (_PICTURE_PX[0] - size[0]) // 2, (_PICTURE_PX[1] - size[1]) // 2
+    place = np.full((_PICTURE_PX[1], _PICTURE_PX[0], 3), _UNKNOWN, np.uint8)
+    place[top : top + size[1], left : left + size[0]] = cv2.resize(picture_u8, size, interpolation=method)
+    return place
 
 
 def _scale(grid: OccupancyGrid) -> tuple[float, Float64Array]:

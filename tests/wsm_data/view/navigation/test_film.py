@@ -18,7 +18,7 @@ def frame(dreamed=None):
     way = np.array([[1.0, 1.0], [2.0, 1.0]])
     return FilmFrame(
         seen_u8=np.full((36, 64, 3), (200, 10, 10), np.uint8),
-        dreamed_u8=dreamed,
+        beside_u8=dreamed,
         true_m=way,
         estimated_m=way + np.array([0.0, 1.5]),
         caption=("a", "b"),
@@ -55,3 +55,10 @@ def test_a_film_that_breaks_off_leaves_none(tmp_path, grid):
     with pytest.raises(RuntimeError, match="broken"):
         write_film(tmp_path / "one.mp4", grid, GOAL, frames())
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_square_picture_stands_in_the_middle_undistorted(grid):
+    background = np.full((450, 960, 3), 255, np.uint8)
+    picture = film_picture(background, grid, GOAL, frame(np.full((540, 540, 3), (0, 0, 99), np.uint8)))
+    inside = (picture[135, 480:] == (0, 0, 99)).all(axis=1)
+    assert np.flatnonzero(inside)[[0, -1]].tolist() == [105, 374]  # 270 px wide as it is high: (480 - 270) / 2
