@@ -13,6 +13,7 @@ from typer.core import TyperGroup
 from pipelines.commands import audit, audit_run, bench, evaluate, inspect, run, serve, source, stages, train
 from pipelines.commands.clips import film
 from pipelines.commands.command import Command, CommandGroup
+from pipelines.commands.models import dream
 from pipelines.commands.soundness import audit_latents, check, preflight
 from pipelines.running.interrupts import (
     INTERRUPTED_EXIT_CODE,
@@ -35,6 +36,7 @@ COMMANDS: tuple[Command | CommandGroup, ...] = (
     audit.COMMAND,
     train.COMMAND,
     evaluate.GROUP,
+    dream.COMMAND,
     serve.COMMAND,
     source.GROUP,
     preflight.COMMAND,

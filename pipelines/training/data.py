@@ -5,13 +5,18 @@ from dataclasses import replace
 
 import torch
 
-from pipelines.training.config import TrainRunConfig
-from wsm_data.access.release import open_release
+from pipelines.training.config import HeldOutConfig, TrainRunConfig
+from wsm_data.access.release import Release, open_release
 from wsm_data.errors import ConfigError
+from wsm_data.loaders.batches.batch import Batch
 from wsm_data.loaders.config import Arrangement, LoaderConfig, OrderConfig, ReadConfig, Remainder, SourceConfig
 from wsm_data.loaders.loader import ClipLoader
+from wsm_data.loaders.sources.clips import Sources, SourceTable
+from wsm_data.shards.latent_standard import latent_standard
 from wsm_data.shards.manifest import ReleaseManifest
+from wsm_data.shards.release_codec import codec_of
 from wsm_model.config import ModelConfig, Variant
+from wsm_model.evaluation.decoding import Decoding
 from wsm_model.presets import preset
 
 _LOG = logging.getLogger(__name__)
@@ -49,7 +54,45 @@ def held_out_loader(config: TrainRunConfig, device: torch.device) -> ClipLoader 
     if not manifest.clips_by_split.get(held_out.split):
         _LOG.warning("release %s has no clips of the split %r: nothing is held out", manifest.name, held_out.split)
         return None
+    return clips_loader(source.release, held_out, device, depth=needs_depth(config))
+
+
+def clips_loader(
+    release: str, held_out: HeldOutConfig, device: torch.device, *, depth: bool, seed: int = 0
+) -> ClipLoader:
+    """Clips of a release's split, one by one, in an order of the seed alone.
+
+    Raises:
+        ConfigError: there is no such release or split, or a clip has no depth though it is asked for.
+        IntegrityError: the release is damaged.
+    """
+    return ClipLoader(
+        _one_by_one(SourceConfig(release=release, split=held_out.split), held_out, device, depth=depth, seed=seed),
+        rank=0,
+        world_size=1,
+    )
+
+
+def clip_batch(release: Release, key: str, held_out: HeldOutConfig, device: torch.device, *, depth: bool) -> Batch:
+    """One clip of any split, as a loader gives it.
+
+    Raises:
+        ConfigError: there is no such clip, or it has no depth though it is asked for.
+        IntegrityError: it is damaged.
+    """
+    release.index.row(key)  # refuses a key that is not there
+    source = SourceConfig(release=release.store.root, split="")
+    table = SourceTable(config=source, release=release, selection="", rows=release.index.rows_of([key]), base=0)
+    settings = _one_by_one(source, held_out, device, depth=depth, seed=0)
+    with ClipLoader(settings, rank=0, world_size=1, sources=Sources((table,))) as loader:
+        return next(iter(loader))
+
+
+def _one_by_one(
+    source: SourceConfig, held_out: HeldOutConfig, device: torch.device, *, depth: bool, seed: int
+) -> LoaderConfig:
     order = OrderConfig(
+        seed=seed,
         shuffle=True,
         global_batch=1,
         remainder=Remainder.DROP,
@@ -57,13 +100,21 @@ def held_out_loader(config: TrainRunConfig, device: torch.device) -> ClipLoader 
         max_latents=held_out.max_latents,
         chunk_sizes=(held_out.session.chunk_size,),
     )
-    settings = LoaderConfig(
-        sources=(SourceConfig(release=source.release, split=held_out.split),),
-        order=order,
-        read=ReadConfig(device=str(device), threads=1, prefetch_batches=1),
-        depth=needs_depth(config),
+    read = ReadConfig(device=str(device), threads=1, prefetch_batches=1)
+    return LoaderConfig(sources=(source,), order=order, read=read, depth=depth)
+
+
+def decoding_of(manifest: ReleaseManifest, codec_weights: str) -> Decoding:
+    """What turns latents of a release into pictures.
+
+    Raises:
+        ConfigError: the codec cannot be built, or these are not its weights.
+    """
+    return Decoding(
+        codec=codec_of(manifest, codec_weights),
+        standard=latent_standard(manifest),
+        depth_range=manifest.depth_range,
     )
-    return ClipLoader(settings, rank=0, world_size=1)
 
 
 def needs_depth(config: TrainRunConfig) -> bool:

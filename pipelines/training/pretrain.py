@@ -27,7 +27,7 @@ from pipelines.running.folder import locked
 from pipelines.running.full_disk import full_disk_named
 from pipelines.running.interrupts import termination_noted
 from pipelines.training.config import TrainRunConfig
-from pipelines.training.data import held_out_loader, model_config, training_loader
+from pipelines.training.data import decoding_of, held_out_loader, model_config, training_loader
 from pipelines.training.evaluation import curve_values, evaluate, held_out_errors
 from pipelines.training.pictures import draw_curves, draw_dream
 from wsm_data.access.release import open_release
@@ -38,7 +38,6 @@ from wsm_data.loaders.batches.batch import Batch
 from wsm_data.loaders.loader import ClipLoader
 from wsm_data.schema.latent_standard import LatentStandard
 from wsm_data.shards.latent_standard import latent_standard
-from wsm_data.shards.release_codec import codec_of
 from wsm_model.config import ModelConfig
 from wsm_model.evaluation.decoding import Decoding
 from wsm_model.evaluation.summary import summarise
@@ -237,12 +236,7 @@ def _first_held_out(config: TrainRunConfig, device: torch.device) -> list[Batch]
 
 
 def _decoding(config: TrainRunConfig) -> Decoding:
-    manifest = open_release(config.sources[0].release).manifest
-    return Decoding(
-        codec=codec_of(manifest, config.codec_weights),
-        standard=latent_standard(manifest),
-        depth_range=manifest.depth_range,
-    )
+    return decoding_of(open_release(config.sources[0].release).manifest, config.codec_weights)
 
 
 def _evaluate(config: TrainRunConfig, out: Path, device: torch.device, quiet: bool) -> str:

@@ -1,0 +1,1 @@
+"""A trained model on clips of a release: measured, and drawn."""
