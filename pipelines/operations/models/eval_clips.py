@@ -44,7 +44,7 @@ def eval_clips(
     release = open_release(location)
     opened = open_model(folder, release, codec_weights)
     path = out / "evaluation.json"
-    with clips_loader(release.store.root, config, opened.device, depth=opened.needs_depth, seed=seed) as loader:
+    with clips_loader(location, config, opened.device, depth=opened.needs_depth, seed=seed) as loader:
         record = {
             "model_sha256": opened.card.weights_sha256,
             "steps": opened.card.steps,
