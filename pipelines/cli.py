@@ -4,13 +4,14 @@ import logging
 import sys
 from collections.abc import Callable
 from functools import wraps
+from importlib.metadata import version
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Annotated, Any, NoReturn
 
 import typer
 from typer.core import TyperGroup
 
-from pipelines.commands import audit, audit_run, bench, evaluate, inspect, run, serve, source, stages, train
+from pipelines.commands import audit, audit_run, bench, evaluate, inspect, run, serve, settings, source, stages, train
 from pipelines.commands.clips import film
 from pipelines.commands.command import Command, CommandGroup
 from pipelines.commands.models import dream
@@ -30,6 +31,7 @@ COMMANDS: tuple[Command | CommandGroup, ...] = (
     run.RUN_COMMAND,
     run.DEMO_COMMAND,
     run.STATUS_COMMAND,
+    settings.COMMAND,
     inspect.COMMAND,
     film.COMMAND,
     audit_run.COMMAND,
@@ -103,6 +105,23 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+
+
+def _show_version(asked: bool) -> None:
+    if asked:
+        typer.echo(f"wsm {version('wsm')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    _version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    """Options that stand before a command."""
+
+
 for _command in COMMANDS:
     _add(app, _command)
 

@@ -22,6 +22,20 @@ def command_text(words: str, config: object, default: object) -> str:
     return " ".join([words, *(f"--set {shlex.quote(word)}" for word in _assignments(config, default))])
 
 
+def toml_text(value: object) -> str:
+    """A value as `--set` takes it; what is None is left out of a table, where it stands for the default."""
+    if is_dataclass(value):
+        value = {field.name: getattr(value, field.name) for field in fields(value)}
+    if isinstance(value, Mapping):
+        items = [f"{json.dumps(key)} = {toml_text(item)}" for key, item in sorted(value.items()) if item is not None]
+        return "{" + ", ".join(items) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(toml_text(item) for item in value) + "]"
+    if isinstance(value, Enum):
+        return json.dumps(value.value)
+    return "none" if value is None else json.dumps(value)
+
+
 def _assignments(config: object, default: object, where: str = "") -> Iterator[str]:
     for field in fields(config):  # type: ignore[arg-type]
         value, old = getattr(config, field.name), getattr(default, field.name)
@@ -31,18 +45,4 @@ def _assignments(config: object, default: object, where: str = "") -> Iterator[s
         if is_dataclass(value):
             yield from _assignments(value, old, name)
         else:
-            yield f"{name}={_toml(value)}"
-
-
-def _toml(value: object) -> str:
-    """A value in TOML; what is None is left out of a table, where it stands for the default."""
-    if is_dataclass(value):
-        value = {field.name: getattr(value, field.name) for field in fields(value)}
-    if isinstance(value, Mapping):
-        items = [f"{json.dumps(key)} = {_toml(item)}" for key, item in sorted(value.items()) if item is not None]
-        return "{" + ", ".join(items) + "}"
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(_toml(item) for item in value) + "]"
-    if isinstance(value, Enum):
-        return json.dumps(value.value)
-    return "none" if value is None else json.dumps(value)
+            yield f"{name}={toml_text(value)}"

@@ -5,6 +5,8 @@ import signal
 import subprocess
 import sys
 import time
+import tomllib
+from pathlib import Path
 
 import pytest
 from fake_runs import environment
@@ -163,3 +165,8 @@ def test_help_lists_every_stage_and_a_stage_lists_every_option():
     options = ("--config", "--set", "--out", "--workers", "--engine", "--limit", "--only", "--dry-run", "--max-refused")
     for name in ("index", "run", "demo"):
         assert set(options) <= set(help_of(name).replace(",", " ").split())
+
+
+def test_the_version_is_that_of_the_project(wsm):
+    project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
+    assert wsm("--version").stdout == f"wsm {project['version']}\n"

@@ -18,8 +18,8 @@ class LossConfig:
     """Weights of the parts (paper, table "Pretraining hyperparameters").
 
     Attributes:
-        depth: lambda_d.
-        pose: lambda_p.
+        depth: weight lambda_d of the loss of depth.
+        pose: weight lambda_p of the loss of poses.
         pose_delta: delta of the smooth-L1 norm, m and quaternion units.
         flow_shift: gamma of the flow time.
     """
