@@ -12,7 +12,7 @@ import typer
 from typer.core import TyperGroup
 
 from pipelines.commands import audit, audit_run, bench, evaluate, inspect, run, serve, settings, source, stages, train
-from pipelines.commands.clips import film
+from pipelines.commands.clips import export, film
 from pipelines.commands.command import Command, CommandGroup
 from pipelines.commands.models import dream
 from pipelines.commands.soundness import audit_latents, check, preflight
@@ -34,6 +34,7 @@ COMMANDS: tuple[Command | CommandGroup, ...] = (
     settings.COMMAND,
     inspect.COMMAND,
     film.COMMAND,
+    export.GROUP,
     audit_run.COMMAND,
     audit.COMMAND,
     train.COMMAND,

@@ -16,7 +16,7 @@ def film(
     weights: Annotated[str, typer.Option("--weights", help="Folder of the codec's weights, where it has any.")] = "",
 ) -> None:
     """Write a film of a clip: colour, depth, and its way on the map."""
-    from pipelines.operations.film import film_clip
+    from pipelines.operations.clips.film import film_clip
 
     film_clip(release, key, out, weights)
 

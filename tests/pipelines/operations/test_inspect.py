@@ -10,6 +10,7 @@ from pipelines.recipe import Recipe, stage_config
 from pipelines.registry import load_stage
 from pipelines.running.options import RunOptions
 from pipelines.running.runner import run_stage
+from wsm_data.access.release import open_release
 from wsm_data.errors import ConfigError, IntegrityError
 
 SCENE = "box_zed/Acker.ville"
@@ -96,6 +97,14 @@ def test_a_film_that_would_be_no_mp4_is_a_wrong_request(release, capsys, tmp_pat
     assert stopped.value.code == 2
     assert "ends in .mp4" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_as_many_clips_are_exported_as_asked_for_each_in_a_folder_of_its_own(release, capsys, tmp_path):
+    app(["export", "tum", str(release), "--split", "train", "--limit", "2", "-o", str(tmp_path)], standalone_mode=False)
+    assert capsys.readouterr().out == f"2 of 3 clips: {tmp_path}\n"
+    first = open_release(release).keys(split="train")[:2]
+    assert {path.name for path in tmp_path.iterdir()} == {key.replace("/", ".") for key in first}
+    assert all(len((path / "groundtruth.txt").read_text().splitlines()) == 5 for path in tmp_path.iterdir())
 
 
 def test_without_a_name_the_sheet_is_called_after_its_clip(release, capsys, tmp_path, monkeypatch):
