@@ -53,7 +53,7 @@ def write_tum_sequence(folder: Path, clip: Clip, decoded: DecodedVideo) -> None:
 
 def _world_poses(clip: Clip) -> Float64Array:
     """OpenCV camera to world of every raw frame, padding included; float64 [T, 4, 4], m."""
-    return np.asarray(clip.meta.T_world_camera0_matrix @ transforms_from_vectors(clip.poses))
+    return np.asarray(clip.meta.T_world_camera0_matrix @ transforms_from_vectors(clip.poses.astype(np.float64)))
 
 
 def _write_camera(folder: Path, clip: Clip) -> None:
