@@ -1,5 +1,6 @@
 """Pictures of a training run: its curves, and what the model makes of a held-out clip."""
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import torch
@@ -34,6 +35,25 @@ CURVE_UNITS = {
 _FRAMES_SHOWN = 5
 
 
+@dataclass(frozen=True, kw_only=True)
+class DreamedClip:
+    """The beginning of a clip as it was seen, and a dream behind it; latents are standardised.
+
+    Attributes:
+        seen: latents that were seen.
+        end: latents that were seen and dreamed, F.
+        rgb: true latents, then dreamed ones, [F, C, h, w].
+        depth: estimated, [F, C, h, w]; None without SLAM.
+        poses: estimated, [F, M, 7]; without SLAM the true ones of what was seen.
+    """
+
+    seen: int
+    end: int
+    rgb: Tensor
+    depth: Tensor | None
+    poses: Tensor
+
+
 def draw_curves(run: Path) -> None:
     """Write curves.png of a run's metrics."""
     records = list(read_lines(run / "metrics.jsonl"))
@@ -64,6 +84,17 @@ def draw_dream(
         shift: gamma of the flow time.
         title: of the sheet.
     """
+    dreamed = dream_clip(model, batch, config, shift=shift)
+    if path is not None:
+        _draw(path, batch, decoding, title, dreamed)
+
+
+def dream_clip(model: WorldSlamModel, batch: Batch, config: HeldOutConfig, *, shift: float) -> DreamedClip:
+    """Let a model see the first half of a clip and dream a chunk; arguments as in `draw_dream`.
+
+    Raises:
+        ValueError: the model gave no dream.
+    """
     rgb = batch.rgb[0].float()
     seen, end = dream_bounds(batch.spans[0].length, config.session.chunk_size)
     noise = torch.randn(end - seen, *rgb.shape[1:], generator=torch.Generator().manual_seed(0)).to(rgb.device)
@@ -75,38 +106,31 @@ def draw_dream(
     )
     streamed = stream_clip(model, rgb[:seen], config.session, issued_FM7=batch.poses[0, :seen].float(), request=request)
     dream = streamed.dream
-    if path is None or dream is None:
-        return
-    poses = torch.cat([streamed.poses, dream.poses[0]])
-    estimated = None if dream.depth is None else torch.cat([streamed.depth, dream.depth[0]])
-    _draw(path, batch, decoding, title, seen=seen, end=end, dreamed=dream.rgb[0], depth=estimated, poses=poses)
+    if dream is None:
+        raise ValueError("a dream that was asked for must be there, and there is none")
+    return DreamedClip(
+        seen=seen,
+        end=end,
+        rgb=torch.cat([rgb[:seen], dream.rgb[0]]),
+        depth=None if dream.depth is None else torch.cat([streamed.depth, dream.depth[0]]),
+        poses=torch.cat([streamed.poses, dream.poses[0]]),
+    )
 
 
-def _draw(
-    path: Path,
-    batch: Batch,
-    decoding: Decoding,
-    title: str,
-    *,
-    seen: int,
-    end: int,
-    dreamed: Tensor,
-    depth: Tensor | None,
-    poses: Tensor,
-) -> None:
+def _draw(path: Path, batch: Batch, decoding: Decoding, title: str, dreamed: DreamedClip) -> None:
+    seen, end, depth = dreamed.seen, dreamed.end, dreamed.depth
     true_rgb = batch.rgb[0, :end].float()
     first = frames_of(seen)  # the first raw frame of the dream
     dreamed_frames = frames_of(end) - first
     frames = [first + one for one in spread_frames(dreamed_frames, _FRAMES_SHOWN)]
-    with_dream = torch.cat([true_rgb[:seen], dreamed])
     true_m, estimated_m = (
-        raw_frame_poses(slots.float())[:, :3].double().cpu().numpy() for slots in (batch.poses[0, :end], poses)
+        raw_frame_poses(slots.float())[:, :3].double().cpu().numpy() for slots in (batch.poses[0, :end], dreamed.poses)
     )
     sheet = DreamSheet(
         title=f"{title}: {batch.keys[0]}, {first} frames seen, {dreamed_frames} dreamed",
         frames=tuple(frames),
         true_rgb_u8=decoding.rgb_u8(true_rgb)[frames],
-        dreamed_rgb_u8=decoding.rgb_u8(with_dream)[frames],
+        dreamed_rgb_u8=decoding.rgb_u8(dreamed.rgb)[frames],
         true_depth_m=None if batch.depth is None else decoding.depth_m(batch.depth[0, :end])[frames],
         estimated_depth_m=None if depth is None else decoding.depth_m(depth)[frames],
         depth_range=decoding.depth_range,

@@ -1,4 +1,4 @@
-"""`wsm dream`: a picture of what a trained model makes of one clip."""
+"""`wsm dream`: a picture or a film of what a trained model makes of one clip."""
 
 from pathlib import Path
 from typing import Annotated
@@ -15,7 +15,7 @@ def dream(
     model: Model,
     release: Release,
     clip: Annotated[str, typer.Argument(metavar="CLIP", help="Key of a clip; `wsm inspect RELEASE` lists them.")],
-    out: Annotated[Path, typer.Option("--out", "-o", help="PNG to write; replaced.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="PNG, or MP4 of true beside dreamed frames; replaced.")],
     assignments: HeldOutAssignments = None,
     flow_shift: FlowShift = 5.0,
     codec_weights: CodecWeights = "",
@@ -29,4 +29,4 @@ def dream(
     operation.dream(model, release, clip, out, config, flow_shift=flow_shift, codec_weights=codec_weights)
 
 
-COMMAND = Command(name="dream", summary="Draw what a model dreams of a clip, beside the truth.", call=dream)
+COMMAND = Command(name="dream", summary="Draw or film what a model dreams of a clip, beside the truth.", call=dream)
