@@ -36,8 +36,8 @@ def dream(
         codec_weights: folder of the weights of the release's codec, where it has any.
 
     Raises:
-        ConfigError: the file is no PNG or MP4, there is no model, release or clip, it is of other latents, or the
-            clip leaves nothing to dream.
+        ConfigError: the file is no PNG or MP4, there is no model, release or clip, the model is of other
+            latents, or the clip leaves nothing to dream.
         IntegrityError: the model or the clip is damaged.
     """
     if out.suffix not in (".png", ".mp4"):
