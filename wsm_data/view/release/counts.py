@@ -1,17 +1,14 @@
 """What a release holds, counted over its index."""
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import pyarrow as pa
 
 from wsm_data.access.release import Release
 from wsm_data.shards.index import IndexTable
 from wsm_data.shards.names import TRAIN_SPLIT
-
-_TEXT_COLUMNS = ("split", "group", "camera", "scene", "physical_scene")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,7 +93,6 @@ class ReleaseCounts:
 def count_release(release: Release) -> ReleaseCounts:
     """Count the clips of a release over its index; no shard is opened."""
     frames_per_clip = release.index.numbers("frames").astype(np.int64) - release.index.numbers("padded_frames")
-    table = _text_columns(release.index).append_column("frames", pa.array(frames_per_clip))
     splits = sorted(release.manifest.clips_by_split, key=lambda split: (split != TRAIN_SPLIT, split))
     return ReleaseCounts(
         clips=len(release.index),
@@ -104,42 +100,64 @@ def count_release(release: Release) -> ReleaseCounts:
         padded_frames=int(release.index.numbers("padded_frames").sum()),
         bytes=sum(shard.bytes for shard in release.manifest.shards),
         splits=tuple(splits),
-        groups=_groups(table),
-        scenes=_scenes(table),
+        groups=_groups(release.index, frames_per_clip),
+        scenes=_scenes(release.index, frames_per_clip),
     )
 
 
-def _text_columns(index: IndexTable) -> pa.Table:
-    columns = index.columns(_TEXT_COLUMNS)
-    return pa.table({name: columns[name].cast(pa.string()) for name in _TEXT_COLUMNS})
+@dataclass(frozen=True, kw_only=True)
+class _Tally:
+    """How often a combination of texts occurs."""
+
+    texts: tuple[str, ...]
+    clips: int
+    frames: int
 
 
-def _groups(table: pa.Table) -> tuple[GroupCount, ...]:
-    grouped = table.group_by(["group", "camera", "split"]).aggregate([("frames", "count"), ("frames", "sum")])
-    scenes = Counter(row["group"] for row in table.group_by(["group", "scene"]).aggregate([]).to_pylist())
-    rows = sorted(grouped.to_pylist(), key=lambda row: (row["group"], row["split"]))
+def _tallies(index: IndexTable, names: Sequence[str], frames_per_clip: np.ndarray) -> list[_Tally]:
+    """Clips and frames of each combination of some text columns, sorted by their texts.
+
+    Counted with numpy: pyarrow's `group_by` imports pandas, wherever it is installed.
+    """
+    if not len(index):
+        return []
+    columns = [index.codes(name) for name in names]
+    sizes = [len(values) for _, values in columns]
+    found, rows = np.unique(np.ravel_multi_index([codes for codes, _ in columns], sizes), return_inverse=True)
+    clips, frames = np.bincount(rows), np.bincount(rows, weights=frames_per_clip)
+    places = zip(*np.unravel_index(found, sizes), strict=True)
+    texts = [tuple(values[place] for (_, values), place in zip(columns, one, strict=True)) for one in places]
+    return sorted(
+        (_Tally(texts=one, clips=int(clips[row]), frames=int(frames[row])) for row, one in enumerate(texts)),
+        key=lambda tally: tally.texts,
+    )
+
+
+def _groups(index: IndexTable, frames_per_clip: np.ndarray) -> tuple[GroupCount, ...]:
+    scenes = Counter(tally.texts[0] for tally in _tallies(index, ("group", "scene"), frames_per_clip))
+    by_split = _tallies(index, ("group", "split", "camera"), frames_per_clip)
     return tuple(
         GroupCount(
             group=group,
-            camera=next(row["camera"] for row in rows if row["group"] == group),
-            clips_by_split={row["split"]: row["frames_count"] for row in rows if row["group"] == group},
+            camera=next(tally.texts[2] for tally in by_split if tally.texts[0] == group),
+            clips_by_split={tally.texts[1]: tally.clips for tally in by_split if tally.texts[0] == group},
             scenes=scenes[group],
-            frames=sum(row["frames_sum"] for row in rows if row["group"] == group),
+            frames=sum(tally.frames for tally in by_split if tally.texts[0] == group),
         )
         for group in sorted(scenes)
     )
 
 
-def _scenes(table: pa.Table) -> SceneCount:
-    rows = table.group_by(["physical_scene", "split"]).aggregate([("frames", "count")]).to_pylist()
-    trained = {row["physical_scene"] for row in rows if row["split"] == TRAIN_SPLIT}
-    held_out = {row["physical_scene"] for row in rows if row["split"] != TRAIN_SPLIT}
+def _scenes(index: IndexTable, frames_per_clip: np.ndarray) -> SceneCount:
+    tallies = _tallies(index, ("physical_scene", "split"), frames_per_clip)
+    trained = {tally.texts[0] for tally in tallies if tally.texts[1] == TRAIN_SPLIT}
+    held_out = {tally.texts[0] for tally in tallies if tally.texts[1] != TRAIN_SPLIT}
     shared = trained & held_out
-    outside = [row for row in rows if row["split"] != TRAIN_SPLIT and row["physical_scene"] in shared]
+    outside = [tally for tally in tallies if tally.texts[1] != TRAIN_SPLIT and tally.texts[0] in shared]
     return SceneCount(
         total=len(trained | held_out),
-        by_split=dict(sorted(Counter(row["split"] for row in rows).items())),
+        by_split=dict(sorted(Counter(tally.texts[1] for tally in tallies).items())),
         held_out=len(held_out),
         shared=tuple(sorted(shared)),
-        shared_clips=sum(row["frames_count"] for row in outside),
+        shared_clips=sum(tally.clips for tally in outside),
     )
