@@ -11,7 +11,7 @@ import torch.utils.data
 
 from wsm_data.access.clip_reader import read_members, span_of_members
 from wsm_data.access.shard_reader import ShardReader
-from wsm_data.errors import IntegrityError
+from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.geometry.transform import transforms_from_vectors
 from wsm_data.loaders.batches.batch import Batch
 from wsm_data.loaders.batches.query_batch import QueryBatch
@@ -147,6 +147,7 @@ class _MapReader:
             readers: of the shards of each source.
 
         Raises:
+            ConfigError: a clip has no map but the strip that its expert swept.
             IntegrityError: the bytes of a clip are not those that the release vouches for; names shard and clip.
         """
         maps = self._clip_maps(history.refs.tolist(), readers)
@@ -197,7 +198,13 @@ class _MapReader:
             member.name: np.frombuffer(content_of(data, member), STORED_DTYPES[member.name]).reshape(member.shape)
             for member in members[:-1]
         }
-        return _ClipMap(meta=_meta(content_of(data, members[-1]), row), **arrays)
+        meta = _meta(content_of(data, members[-1]), row)
+        if meta.map_from == "path":  # all but the expert's own strip is unknown, so every other way would be unsafe
+            raise ConfigError(
+                f"{row.shard}, clip {row.key}: the clip of a query must have a map, but its source had neither a cloud nor "
+                "depth to make one of; select clips whose map_from is cloud or depth"
+            )
+        return _ClipMap(meta=meta, **arrays)
 
 
 def _meta(content: memoryview, row: IndexRow) -> ClipMeta:

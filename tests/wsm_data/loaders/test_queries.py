@@ -237,3 +237,13 @@ def test_a_release_behind_a_url_gives_the_same_queries(remote, tmp_path, access)
             assert seen([one]) == seen([other])
             for name in ("occupancy", "geodesic_mm", "T_world_camera", "expert_distance_m"):
                 assert torch.equal(getattr(one, name), getattr(other, name))
+
+
+def test_a_clip_whose_map_is_its_own_path_answers_no_query(tmp_path, make_clip, tiny):
+    clips = [make_clip(f"synth_d435i/home_0001/{number:06d}", latents=8, map_from="path") for number in range(2)]
+    tiny.pack(tmp_path / "strips", clips, shard_bytes=700_000)
+    with (
+        QueryLoader(config_of(str(tmp_path / "strips")), TWO) as loader,
+        pytest.raises(ConfigError, match="must have a map, but its source had neither a cloud nor depth"),
+    ):
+        next(iter(loader))
