@@ -201,8 +201,8 @@ class _MapReader:
         meta = _meta(content_of(data, members[-1]), row)
         if meta.map_from == "path":  # all but the expert's own strip is unknown, so every other way would be unsafe
             raise ConfigError(
-                f"{row.shard}, clip {row.key}: the clip of a query must have a map, but its source had neither a cloud nor "
-                "depth to make one of; select clips whose map_from is cloud or depth"
+                f"{row.shard}, clip {row.key}: the clip of a query must have a map, but its source had neither a "
+                "cloud nor depth to make one of; select clips whose map_from is cloud or depth"
             )
         return _ClipMap(meta=meta, **arrays)
 

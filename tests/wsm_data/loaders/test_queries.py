@@ -244,6 +244,6 @@ def test_a_clip_whose_map_is_its_own_path_answers_no_query(tmp_path, make_clip, 
     tiny.pack(tmp_path / "strips", clips, shard_bytes=700_000)
     with (
         QueryLoader(config_of(str(tmp_path / "strips")), TWO) as loader,
-        pytest.raises(ConfigError, match="must have a map, but its source had neither a cloud nor depth"),
+        pytest.raises(ConfigError, match="must have a map, but its source had neither"),
     ):
         next(iter(loader))
