@@ -112,6 +112,7 @@ def identity_of(
 
 
 def _run(config: TrainRunConfig, out: Path, device: torch.device, quiet: bool) -> str | None:
+    _require_decodable(config)
     rank, world_size = rank_and_world_size()
     with training_loader(config, device, str(out / "ledger"), rank, world_size) as loader:
         release = loader.sources.tables[0].release
@@ -233,6 +234,23 @@ def _first_held_out(config: TrainRunConfig, device: torch.device) -> list[Batch]
         )
     with loader:
         return list(islice(loader, config.held_out.sampled_clips))
+
+
+def _require_decodable(config: TrainRunConfig) -> None:
+    """Whatever is measured or drawn is decoded: say before the first step, not after the last, that it cannot be.
+
+    Raises:
+        ConfigError: the codec of the release cannot be built.
+    """
+    if not (config.held_out.clips or config.training.sample_every):
+        return
+    try:
+        _decoding(config)
+    except ConfigError as error:
+        raise ConfigError(
+            f"{error}. Held-out clips are measured on decoded frames: name the weights in codec_weights, or set "
+            "held_out.clips=0 and training.sample_every=0"
+        ) from error
 
 
 def _decoding(config: TrainRunConfig) -> Decoding:

@@ -17,6 +17,7 @@ from wsm_data.loaders.config import LoaderConfig, OrderConfig, SourceConfig
 from wsm_data.loaders.loader import ClipLoader
 from wsm_data.readers.arrays import write_episode
 from wsm_data.schema.occupancy import FREE, OCCUPIED
+from wsm_data.shards.latent_standard import latent_standard
 from wsm_model.config import Variant
 from wsm_model.training.config import TrainingConfig
 
@@ -85,8 +86,8 @@ def test_batches_without_depth_are_those_of_any_clip_and_batches_with_depth_say_
     assert batch.depth is None
     assert batch.depth_valid is None
     opened = open_release(release)
-    standard = opened.manifest.rgb_statistics
-    mean, std = (np.array(one, np.float32)[:, None, None] for one in (standard.mean, standard.std))
+    standard = latent_standard(opened.manifest)
+    mean, std = (np.array(one, np.float32)[:, None, None] for one in (standard.rgb_mean, standard.rgb_std))
     for row, key in enumerate(batch.keys):
         clip = opened.read_clip(key)
         wanted = (clip.rgb_latent.astype(np.float32) - mean) / std

@@ -18,9 +18,9 @@ class LatentStandard:
         codec: name of the codec.
         codec_digest: digest of its settings and weights.
         rgb_mean: of RGB latents.
-        rgb_std: of RGB latents.
+        rgb_std: what RGB latents are divided by: their deviations, or what the codec makes of them (`channel_scales`).
         depth_mean: of depth latents; empty where there is no depth.
-        depth_std: of depth latents; likewise.
+        depth_std: what depth latents are divided by; likewise.
     """
 
     codec: str

@@ -84,6 +84,7 @@ def test_whatever_the_reader_made_of_a_trajectory_is_in_its_digest_and_where_its
         "frames_digest": "others",
         "content_digest": "another",
         "notes": ("episode.length_mismatch",),
+        "goal_world_m": (1.0, 2.0, 0.5),
     }
     places = {"container": "box_zed/hall", "rgb_members": ("a", "b"), "depth_members": ("c", "d")}
     assert {*stated, *places, "id"} == {field.name for field in fields(EpisodeRecord)}

@@ -19,11 +19,11 @@ from wsm_data.schema.dataset import CameraModel
 
 @pytest.fixture
 def tree(tmp_path):
-    """One scene in each of the three layouts, and the manifest of the source."""
-    files = scene_files({0: along_x(frames=5)})
-    write_archive(tmp_path / "tree" / "box_zed" / "loft.tar.gz", files)
-    write_folder(tmp_path / "tree" / "box_zed" / "hall", files)
-    write_folder(tmp_path / "tree" / "box_zed" / "den" / "trajectory_07", files)
+    """A scene of its own in each of the three layouts, and the manifest of the source."""
+    loft, hall, den = (scene_files({0: along_x(frames=frames)}) for frames in (5, 6, 7))
+    write_archive(tmp_path / "tree" / "box_zed" / "loft.tar.gz", loft)
+    write_folder(tmp_path / "tree" / "box_zed" / "hall", hall)
+    write_folder(tmp_path / "tree" / "box_zed" / "den" / "trajectory_07", den)
     (tmp_path / "rooms.toml").write_text(MANIFEST_TOML)
     return tmp_path / "tree"
 

@@ -11,9 +11,11 @@ from types import SimpleNamespace
 
 import pytest
 import torch
+from tiny_release import pack
 from typer.testing import CliRunner
 
 from pipelines.cli import app
+from wsm_data.codecs.dct import DctCodec
 from wsm_data.files.digest import sha256_file
 from wsm_data.shards.manifest import manifest_bytes
 from wsm_data.shards.statistics import LatentStatistics
@@ -29,6 +31,16 @@ SETTINGS = (
     "training.checkpoint_every=1",
     "held_out.clips=1",
 )
+
+
+@pytest.fixture
+def tiny(tmp_path, clips) -> SimpleNamespace:
+    """The tiny release with a codec that there is: what a model dreams is decoded to be measured."""
+    codec, folder = DctCodec().describe(), tmp_path / "release"
+    own = [replace(clip, meta=replace(clip.meta, codec_digest=codec.digest)) for clip in clips]
+    return SimpleNamespace(
+        folder=folder, manifest=pack(folder, own, shard_bytes=200_000, codec=codec), codec=codec, clips=own
+    )
 
 
 @pytest.fixture
@@ -160,3 +172,11 @@ def test_a_run_without_evaluation_says_where_its_model_is(run):
     assert done.code == 0, done.text
     assert "camera ATE" not in done.text
     assert re.search(r"model: .*model", done.text)
+
+
+def test_a_release_that_cannot_be_decoded_is_refused_before_the_first_step_with_both_ways_out(run, packed_tiny):
+    done = run(release=packed_tiny[0])  # of a codec nobody has
+    assert done.code == 2, done.text
+    assert "codec_weights" in done.text
+    assert "held_out.clips=0" in done.text
+    assert not (done.out / "checkpoints").exists()

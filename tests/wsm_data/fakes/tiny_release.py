@@ -120,7 +120,9 @@ def _inventory(clips: Sequence[Clip]) -> list[InventoryRow]:
     return rows
 
 
-def pack(folder: Path, clips: Sequence[Clip], *, shard_bytes: int, **changes: object) -> ReleaseManifest:
+def pack(
+    folder: Path, clips: Sequence[Clip], *, shard_bytes: int, codec: CodecInfo = CODEC, **changes: object
+) -> ReleaseManifest:
     """A release of these clips in `folder`; `changes` replace arguments of `finish_release`."""
     fragments = folder.with_name(f"{folder.name}.fragments")
     paths = {clip.meta.key: write_fragment(fragments, build_fragment(clip)) for clip in clips}
@@ -142,7 +144,7 @@ def pack(folder: Path, clips: Sequence[Clip], *, shard_bytes: int, **changes: ob
     }
     facts = ReleaseFacts(
         name="tiny",
-        codec=CODEC,
+        codec=codec,
         depth_range=DepthRange(),
         encoded_width_px=WIDTH_PX,
         encoded_height_px=HEIGHT_PX,

@@ -20,6 +20,8 @@ def looking_at_a_corner(folder, *, still=False):
     s = np.sqrt(0.5)
     rays = np.stack([*np.meshgrid((np.arange(128) - 63.5) / 96, (np.arange(96) - 47.5) / 96), np.ones((96, 128))], -1)
 
+    rng = np.random.default_rng(0)
+
     def frames():
         for i in range(10):
             T = np.array([[1.0, 0, 0, 0], [0, -s, s, 0.1 * (0 if still else i)], [0, -s, -s, 1], [0, 0, 0, 1]])
@@ -29,7 +31,8 @@ def looking_at_a_corner(folder, *, still=False):
             points_m = (rays * depth_m[..., None]) @ seen[:3, :3].T + seen[:3, 3]
             squares = (np.floor(points_m[..., 0] / 0.3) * 7 + np.floor(points_m[..., 1] / 0.3) * 13) % 5
             grey = (40 + 40 * squares).astype(np.uint8)
-            yield np.repeat(grey[..., None], 3, axis=-1), depth_m.astype(np.float32), T
+            noisy_m = depth_m + rng.normal(0, 1e-3, depth_m.shape)  # an endless floor without noise repeats to the bit
+            yield np.repeat(grey[..., None], 3, axis=-1), noisy_m.astype(np.float32), T
 
     write_episode(folder, "floor", "one", frames(), K=K, camera="made", floor_z_m=0.0)
 
