@@ -14,7 +14,9 @@ LIMIT_BYTES = 6_000_000_000
 LIMIT_S = 120
 
 _SERVER = multiprocessing.get_context("forkserver")
-_SERVER.set_forkserver_preload(["pipelines.cli", "pipelines.operations.run_stage", "pipelines.stages.index"])
+_SERVER.set_forkserver_preload(  # a process has one such server: the workers of runs in it are forked from it too
+    ["pipelines.warm_start", "pipelines.cli", "pipelines.operations.run_stage", "pipelines.stages.index"]
+)
 
 
 def limited(words: list[str], said: Path) -> int:
