@@ -44,7 +44,7 @@ class CachedShards:
         self._cache = ShardCache(Path(config.cache_dir), release_digest(manifest), self._limit_bytes)
         self._store = open_remote_store(root, config)
         self._threads = config.fetch_threads
-        self._lock, self._downloading = threading.Lock(), threading.Lock()  # one shard after the other, by all threads
+        self._lock = threading.Lock()
         self._announced: Announcements[None] = Announcements()
         self._unreachable: set[str] = set()
         self._closed, self._news = threading.Event(), threading.Event()
@@ -94,8 +94,11 @@ class CachedShards:
             return file is not None
 
     def _read_downloaded(self, shard: ShardInfo, span: Span, buffers: Sequence[memoryview]) -> bool:
-        """Download the shard and read it before others may remove it; False where it cannot be downloaded now."""
-        with self._downloading, self._cache.reserved(shard) as file:
+        """Download the shard and read it before others may remove it; False where it cannot be downloaded now.
+
+        Threads do not queue here: what a store hangs over, and is needed later, must not hold up what is needed now.
+        """
+        with self._cache.reserved(shard) as file:
             if file is not None:
                 download(shard, self._store, file, self._threads)
                 self._read_from(file.fileno(), span, buffers)
