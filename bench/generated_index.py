@@ -9,8 +9,8 @@ import pyarrow.compute as pc
 from wsm_data.files.digest import sha256_file
 from wsm_data.schema.codec import CodecInfo
 from wsm_data.schema.depth import DepthRange
-from wsm_data.shards.index import write_index
-from wsm_data.shards.index_row import SCHEMA
+from wsm_data.shards.index.row import SCHEMA
+from wsm_data.shards.index.table import write_index
 from wsm_data.shards.manifest import ReleaseManifest, ShardInfo, manifest_bytes
 from wsm_data.shards.members import MEMBER_NAMES, META, STORED_DTYPES, shape_of
 from wsm_data.shards.names import INDEX_NAME, MANIFEST_NAME, shard_name

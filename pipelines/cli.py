@@ -11,9 +11,10 @@ from typing import Annotated, Any, NoReturn
 import typer
 from typer.core import TyperGroup
 
-from pipelines.commands import audit, audit_run, bench, evaluate, inspect, run, serve, settings, source, stages, train
+from pipelines.commands import audit, audit_run, bench, inspect, run, serve, settings, source, stages, train
 from pipelines.commands.clips import export, film
 from pipelines.commands.command import Command, CommandGroup
+from pipelines.commands.evaluating import group as evaluate
 from pipelines.commands.models import dream
 from pipelines.commands.soundness import audit_latents, check, preflight
 from pipelines.running.interrupts import (

@@ -9,7 +9,7 @@ from wsm_data.access.shard_reader import ShardReader, Span
 from wsm_data.errors import IntegrityError
 from wsm_data.files.digest import xxh3_64
 from wsm_data.shards.clip_bytes import content_of
-from wsm_data.shards.index_row import IndexRow
+from wsm_data.shards.index.row import IndexRow
 from wsm_data.shards.members import MEMBER_NAMES, Member, header_bytes
 
 MAX_READS = 3

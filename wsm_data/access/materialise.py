@@ -19,8 +19,8 @@ from wsm_data.shards.assemble import (
     require_shards,
     write_release_files,
 )
-from wsm_data.shards.index import IndexTable
-from wsm_data.shards.index_row import REPEATED_COLUMNS, SCHEMA
+from wsm_data.shards.index.row import REPEATED_COLUMNS, SCHEMA
+from wsm_data.shards.index.table import IndexTable
 from wsm_data.shards.inventory import UnitState
 from wsm_data.shards.manifest import ReleaseManifest, ShardInfo
 from wsm_data.shards.selection import Selection

@@ -26,9 +26,9 @@ from wsm_data.schema.arrays import Int64Array
 from wsm_data.schema.clip import Clip
 from wsm_data.schema.codec import CodecInfo
 from wsm_data.shards.clip_bytes import content_of, decode_clip
-from wsm_data.shards.index import IndexTable
-from wsm_data.shards.index_file import IndexFile, OpenFile, local_file
-from wsm_data.shards.index_row import IndexRow
+from wsm_data.shards.index.file import IndexFile, OpenFile, local_file
+from wsm_data.shards.index.row import IndexRow
+from wsm_data.shards.index.table import IndexTable
 from wsm_data.shards.inventory import InventoryRow, parse_inventory, parse_quarantine
 from wsm_data.shards.manifest import ReleaseManifest, parse_manifest
 from wsm_data.shards.names import INDEX_NAME, INVENTORY_NAME, MANIFEST_NAME, QUARANTINE_NAME

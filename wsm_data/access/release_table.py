@@ -7,8 +7,8 @@ import pyarrow as pa
 from wsm_data.errors import IntegrityError
 from wsm_data.files.stores import Store
 from wsm_data.files.tables import opened_table
-from wsm_data.shards.index import IndexTable
-from wsm_data.shards.index_row import REPEATED_COLUMNS, SCHEMA
+from wsm_data.shards.index.row import REPEATED_COLUMNS, SCHEMA
+from wsm_data.shards.index.table import IndexTable
 from wsm_data.shards.names import SCORES_NAME
 
 _REMEDY = "run `wsm score` again"

@@ -11,8 +11,8 @@ from wsm_data.files.digest import sha256_bytes
 from wsm_data.files.stores import Store, open_store
 from wsm_data.shards.conservation import check_conservation, check_counts
 from wsm_data.shards.findings import Finding, FindingKind
-from wsm_data.shards.index import IndexTable, parse_index
-from wsm_data.shards.index_row import IndexRow
+from wsm_data.shards.index.row import IndexRow
+from wsm_data.shards.index.table import IndexTable, parse_index
 from wsm_data.shards.inventory import parse_inventory, parse_quarantine
 from wsm_data.shards.manifest import ReleaseManifest, ShardInfo
 from wsm_data.shards.names import INDEX_NAME, INVENTORY_NAME, QUARANTINE_NAME

@@ -11,7 +11,7 @@ from wsm_data.schema.clip import UNREACHABLE_MM, Clip
 from wsm_data.schema.occupancy import FREE, OCCUPIED, UNKNOWN
 from wsm_data.shards.clip_bytes import content_of, decode_clip
 from wsm_data.shards.findings import Finding, FindingKind
-from wsm_data.shards.index_row import IndexRow
+from wsm_data.shards.index.row import IndexRow
 from wsm_data.shards.manifest import ReleaseManifest
 from wsm_data.shards.members import Member, header_bytes
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from wsm_data.access.verify_clip import check_clip
 from wsm_data.files.stores import Store
 from wsm_data.shards.findings import Finding, FindingKind
-from wsm_data.shards.index_row import IndexRow
+from wsm_data.shards.index.row import IndexRow
 from wsm_data.shards.manifest import ReleaseManifest, ShardInfo
 from wsm_data.shards.tar_format import END_OF_ARCHIVE
 

@@ -7,9 +7,9 @@ import numpy as np
 from wsm_data.checks.limits import verdict_within
 from wsm_data.errors import Reason
 from wsm_data.schema.camera import Intrinsics
-from wsm_data.schema.check_limits import CheckLimits
 from wsm_data.schema.dataset import CameraModel
 from wsm_data.schema.episode import EpisodeRecord
+from wsm_data.schema.source.check_limits import CheckLimits
 from wsm_data.schema.verdict import Verdict
 
 MIN_FIELD_OF_VIEW_DEG = 30.0

@@ -4,8 +4,8 @@ import numpy as np
 
 from wsm_data.errors import Reason
 from wsm_data.geometry.transform import invert, rotation_angle_rad
-from wsm_data.schema.check_limits import CheckLimits
 from wsm_data.schema.episode import EpisodeRecord
+from wsm_data.schema.source.check_limits import CheckLimits
 from wsm_data.schema.verdict import Verdict
 
 STEP_RATIO = 8.0

@@ -16,7 +16,7 @@ from wsm_data.curation.scores_table import Direction, ScorerInfo
 from wsm_data.errors import ConfigError
 from wsm_data.files.tables import opened_table, read_statement, require_columns, with_statement
 from wsm_data.schema.arrays import Float64Array
-from wsm_data.shards.index import IndexTable
+from wsm_data.shards.index.table import IndexTable
 
 ROLLOUTS_VERSION = 2
 _STATEMENT = "wsm.rollouts"

@@ -158,15 +158,15 @@ class ClipLoader(torch.utils.data.IterableDataset[Batch]):
             batch_of: the batch that something was made of.
         """
         self._turn += 1
-        turn, delivery = self._turn, self._start(complete)
+        turn, delivery, is_over = self._turn, self._start(complete), False
         try:
             while (delivered := self._deliver(turn, delivery, batch_of)) is not None:
                 yield delivered
                 del delivered  # its memory is free as soon as the caller lets go of it
-        except BaseException:  # an error of a step, an interrupt, or the caller breaks off
-            if turn == self._turn:
+            is_over = True
+        finally:
+            if not is_over and turn == self._turn:  # an error of a step, an interrupt, or the caller breaks off
                 self._stop()
-            raise
         delivery.close()
         self._running = None
         self._epoch, self._step = self._epoch + 1, 0

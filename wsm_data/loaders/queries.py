@@ -25,7 +25,7 @@ from wsm_data.schema.clip_meta import ClipMeta, parse_meta
 from wsm_data.schema.occupancy import UNKNOWN
 from wsm_data.schema.sequence import TEMPORAL_RATIO, frames_of
 from wsm_data.shards.clip_bytes import content_of
-from wsm_data.shards.index_row import IndexRow
+from wsm_data.shards.index.row import IndexRow
 from wsm_data.shards.members import META, STORED_DTYPES
 
 _MAP_MEMBERS = ("occupancy", "geodesic_mm", "expert_distance", META)

@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 
-from wsm_data.schema.check_limits import CheckLimits
 from wsm_data.schema.depth import DepthEncoding
+from wsm_data.schema.source.check_limits import CheckLimits
 from wsm_data.schema.source.lerobot_features import LerobotFeatures
 from wsm_data.schema.source.motion import Motion
 from wsm_data.schema.source.sequence_files import SequenceFiles

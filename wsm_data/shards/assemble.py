@@ -12,8 +12,8 @@ from wsm_data.files.digest import sha256_file
 from wsm_data.schema.codec import CodecInfo
 from wsm_data.schema.depth import DepthRange
 from wsm_data.shards.fragment import FragmentInfo
-from wsm_data.shards.index import IndexTable, index_table, write_index
-from wsm_data.shards.index_row import SCHEMA, IndexRow, index_row
+from wsm_data.shards.index.row import SCHEMA, IndexRow, index_row
+from wsm_data.shards.index.table import IndexTable, index_table, write_index
 from wsm_data.shards.inventory import InventoryRow, UnitState, count_reasons, write_inventory, write_quarantine
 from wsm_data.shards.manifest import ReleaseManifest, ShardInfo, manifest_bytes, withdraw_manifest
 from wsm_data.shards.names import (

@@ -10,7 +10,7 @@ from wsm_data.errors import Reason
 from wsm_data.schema.identity import EpisodeId
 from wsm_data.schema.sequence import TEMPORAL_RATIO
 from wsm_data.shards.findings import Finding, FindingKind
-from wsm_data.shards.index import IndexTable
+from wsm_data.shards.index.table import IndexTable
 from wsm_data.shards.inventory import InventoryRow, UnitState, count_reasons
 from wsm_data.shards.manifest import ReleaseManifest
 from wsm_data.shards.names import TRAIN_SPLIT

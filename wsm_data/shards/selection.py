@@ -20,7 +20,7 @@ from wsm_data.files.digest import digest_json
 from wsm_data.files.stores import Store, open_store
 from wsm_data.files.tables import opened_table, read_full, read_statement, with_statement, write_table
 from wsm_data.schema.arrays import Float64Array
-from wsm_data.shards.index import IndexTable
+from wsm_data.shards.index.table import IndexTable
 from wsm_data.shards.names import SELECTIONS_FOLDER
 
 SELECTION_SUFFIX = ".parquet"

@@ -6,7 +6,7 @@ from enum import StrEnum
 from types import MappingProxyType
 
 from wsm_data.schema.camera import Intrinsics
-from wsm_data.schema.layout import Layout
+from wsm_data.schema.source.layout import Layout
 
 CAMERAS: Mapping[str, Intrinsics] = MappingProxyType(
     {

@@ -18,7 +18,7 @@ from wsm_data.readers.registry import source_reader
 from wsm_data.readers.source import Container
 from wsm_data.schema.dataset import DatasetManifest
 from wsm_data.schema.verdict import Verdict
-from wsm_data.shards.index_row import IndexRow
+from wsm_data.shards.index.row import IndexRow
 from wsm_data.shards.release_codec import codec_of
 
 

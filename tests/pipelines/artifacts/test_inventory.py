@@ -15,7 +15,7 @@ from wsm_data.errors import Reason
 from wsm_data.schema.identity import EpisodeId
 from wsm_data.schema.verdict import Refusal
 from wsm_data.shards.conservation import check_conservation
-from wsm_data.shards.index import IndexTable
+from wsm_data.shards.index.table import IndexTable
 from wsm_data.shards.inventory import InventoryRow, UnitState, parse_inventory, write_inventory
 
 SCENE = "box_zed/hall"

@@ -32,7 +32,7 @@ from wsm_data.files.typed_toml import build_config
 from wsm_data.maps.voxels import load_voxels, voxels_digest
 from wsm_data.readers.record_table import read_records
 from wsm_data.readers.source import Container
-from wsm_data.schema.layout import Layout
+from wsm_data.schema.source.layout import Layout
 
 DEN, HALL_SCENE, ZED = "box_d435i/den", "box_d435i/hall", "box_zed/hall"
 SHORT = along_x(frames=4)  # one frame less than a clip needs

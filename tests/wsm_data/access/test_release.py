@@ -14,8 +14,8 @@ from wsm_data.access.release import open_release
 from wsm_data.access.verify import verify_release
 from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.schema.clip import MEMBERS, Clip
-from wsm_data.shards.index import write_index
-from wsm_data.shards.index_row import SCHEMA
+from wsm_data.shards.index.row import SCHEMA
+from wsm_data.shards.index.table import write_index
 from wsm_data.shards.manifest import manifest_bytes, release_digest
 
 

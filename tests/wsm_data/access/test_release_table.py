@@ -7,7 +7,7 @@ import pytest
 
 from wsm_data.access.release import open_release
 from wsm_data.errors import IntegrityError
-from wsm_data.shards.index_row import SCHEMA
+from wsm_data.shards.index.row import SCHEMA
 from wsm_data.shards.names import SCORES_NAME
 
 

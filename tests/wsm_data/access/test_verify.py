@@ -10,8 +10,8 @@ from wsm_data.access.verify import verify_release
 from wsm_data.errors import ConfigError
 from wsm_data.files.digest import sha256_file
 from wsm_data.schema.clip import Clip
-from wsm_data.shards.index import index_table, write_index
-from wsm_data.shards.index_row import SCHEMA
+from wsm_data.shards.index.row import SCHEMA
+from wsm_data.shards.index.table import index_table, write_index
 from wsm_data.shards.manifest import manifest_bytes
 
 

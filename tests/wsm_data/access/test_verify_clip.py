@@ -12,7 +12,7 @@ from wsm_data.schema.depth import DepthRange
 from wsm_data.shards.clip_bytes import encode_clip
 from wsm_data.shards.findings import Finding, FindingKind
 from wsm_data.shards.fragment import build_fragment
-from wsm_data.shards.index_row import IndexRow, index_row
+from wsm_data.shards.index.row import IndexRow, index_row
 from wsm_data.shards.manifest import ReleaseManifest
 
 START = 512 * 1000

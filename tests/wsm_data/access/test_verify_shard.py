@@ -10,7 +10,7 @@ from wsm_data.access.release import open_release
 from wsm_data.access.verify_shard import verify_shard
 from wsm_data.files.stores import LocalStore, open_store
 from wsm_data.shards.findings import Finding, FindingKind
-from wsm_data.shards.index_row import IndexRow
+from wsm_data.shards.index.row import IndexRow
 from wsm_data.shards.manifest import ShardInfo
 
 

@@ -11,7 +11,7 @@ from wsm_data.errors import Reason
 from wsm_data.geometry.camera import T_OPENGL_OPENCV, pixel_rays
 from wsm_data.geometry.transform import invert
 from wsm_data.schema.camera import Intrinsics
-from wsm_data.schema.check_limits import CheckLimits
+from wsm_data.schema.source.check_limits import CheckLimits
 
 INTRINSICS = Intrinsics(fx=60.0, fy=60.0, cx=39.5, cy=29.5, width=80, height=60)
 ROOM = np.array([[-2.0, -2.0, 0.0], [6.0, 4.0, 3.0]])

@@ -5,8 +5,8 @@ import pytest
 from wsm_data.checks.intrinsics_fit import check_intrinsics_fit
 from wsm_data.errors import Reason
 from wsm_data.schema.camera import Intrinsics
-from wsm_data.schema.check_limits import CheckLimits
 from wsm_data.schema.dataset import CameraModel
+from wsm_data.schema.source.check_limits import CheckLimits
 
 
 def verdict_of(make_record, dataset, **changes):

@@ -5,7 +5,7 @@ import pytest
 
 from wsm_data.checks.mount import check_mount
 from wsm_data.errors import Reason
-from wsm_data.schema.check_limits import CheckLimits
+from wsm_data.schema.source.check_limits import CheckLimits
 from wsm_data.schema.source.motion import CarriedBy, Motion
 
 

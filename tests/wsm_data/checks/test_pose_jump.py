@@ -3,7 +3,7 @@ import pytest
 
 from wsm_data.checks.pose_jump import check_pose_jump
 from wsm_data.errors import Reason
-from wsm_data.schema.check_limits import CheckLimits
+from wsm_data.schema.source.check_limits import CheckLimits
 
 LIMITS = CheckLimits()
 

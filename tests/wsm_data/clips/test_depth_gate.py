@@ -11,8 +11,8 @@ from wsm_data.clips.depth_gate import MAX_PAIRS, SPACING_M, agreeing_records, ch
 from wsm_data.errors import DataError, Reason
 from wsm_data.geometry.camera import T_OPENGL_OPENCV
 from wsm_data.geometry.transform import invert
-from wsm_data.schema.check_limits import CheckLimits
 from wsm_data.schema.identity import EpisodeId
+from wsm_data.schema.source.check_limits import CheckLimits
 
 DRIVE = along_x()
 BACKWARDS = np.diag([-1.0, 1.0, -1.0, 1.0])

@@ -15,9 +15,9 @@ from wsm_data.maps.geodesic import geodesic_distance
 from wsm_data.maps.occupancy import occupancy_for
 from wsm_data.maps.scene_map import MAX_MAP_CELLS, build_scene_map, floor_levels
 from wsm_data.maps.voxels import voxels_from_cloud
-from wsm_data.schema.check_limits import CheckLimits
 from wsm_data.schema.occupancy import FREE, OCCUPIED, UNKNOWN
 from wsm_data.schema.point_cloud import PointCloud
+from wsm_data.schema.source.check_limits import CheckLimits
 
 CELL_M = 0.05
 CONFIG = ClipConfig()

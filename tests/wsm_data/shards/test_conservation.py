@@ -6,7 +6,7 @@ import pytest
 
 from wsm_data.access.release import open_release
 from wsm_data.shards.conservation import check_conservation, check_counts
-from wsm_data.shards.index import IndexTable, index_table
+from wsm_data.shards.index.table import IndexTable, index_table
 from wsm_data.shards.inventory import InventoryRow, UnitState
 
 FIRST = "synth_d435i/home_0001/000000"

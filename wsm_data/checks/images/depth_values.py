@@ -7,7 +7,7 @@ import numpy as np
 from wsm_data.checks.limits import verdict_within
 from wsm_data.errors import Reason
 from wsm_data.schema.arrays import Float32Array, Float64Array
-from wsm_data.schema.check_limits import CheckLimits
+from wsm_data.schema.source.check_limits import CheckLimits
 from wsm_data.schema.verdict import Verdict
 
 ROWS_APART = 8

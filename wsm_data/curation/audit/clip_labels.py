@@ -10,7 +10,7 @@ from wsm_data.errors import IntegrityError
 from wsm_data.geometry.transform import transforms_from_vectors
 from wsm_data.schema.arrays import Float64Array
 from wsm_data.schema.clip_meta import ClipMeta, parse_meta
-from wsm_data.shards.index_row import IndexRow
+from wsm_data.shards.index.row import IndexRow
 from wsm_data.shards.members import META, STORED_DTYPES
 
 _LABELS = ("poses", "expert_distance", META)

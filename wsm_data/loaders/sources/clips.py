@@ -19,7 +19,7 @@ from wsm_data.loaders.config import OrderConfig, SourceConfig
 from wsm_data.loaders.order.epoch_order import EpochOrder, order_epoch
 from wsm_data.loaders.order.pass_order import SourceLayout
 from wsm_data.schema.arrays import Int64Array
-from wsm_data.shards.index_row import IndexRow
+from wsm_data.shards.index.row import IndexRow
 from wsm_data.shards.names import TRAIN_SPLIT
 
 

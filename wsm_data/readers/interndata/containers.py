@@ -12,7 +12,7 @@ from wsm_data.files.digest import digest_json
 from wsm_data.readers.source import Container
 from wsm_data.readers.unreadable import error_name
 from wsm_data.schema.dataset import DatasetManifest
-from wsm_data.schema.layout import Layout
+from wsm_data.schema.source.layout import Layout
 
 _log = logging.getLogger(__name__)
 

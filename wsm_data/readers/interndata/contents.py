@@ -17,8 +17,8 @@ from wsm_data.readers.ply import read_point_cloud, require_finite_points
 from wsm_data.readers.source import Container
 from wsm_data.readers.unreadable import too_large
 from wsm_data.schema.dataset import ReadLimits
-from wsm_data.schema.layout import Layout
 from wsm_data.schema.point_cloud import PointCloud
+from wsm_data.schema.source.layout import Layout
 
 FrameKey = tuple[int | None, int]
 """Episode number and image number in an image's name; the first is None where names carry no episode."""

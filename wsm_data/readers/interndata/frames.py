@@ -11,7 +11,7 @@ from wsm_data.readers.unreadable import read_file
 from wsm_data.schema.dataset import DatasetManifest
 from wsm_data.schema.episode import EpisodeRecord
 from wsm_data.schema.frames import EpisodeFrames
-from wsm_data.schema.layout import Layout
+from wsm_data.schema.source.layout import Layout
 
 
 def iter_episode_frames(

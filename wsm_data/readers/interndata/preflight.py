@@ -14,7 +14,7 @@ from wsm_data.readers.interndata.naming import Kind, role_of
 from wsm_data.readers.interndata.scene_files import iter_members
 from wsm_data.readers.source import Container, Preflight
 from wsm_data.schema.dataset import DatasetManifest
-from wsm_data.schema.layout import Layout
+from wsm_data.schema.source.layout import Layout
 from wsm_data.schema.verdict import Refusal
 
 _CHECKS = {Kind.RGB: check_jpeg, Kind.DEPTH: check_png16}

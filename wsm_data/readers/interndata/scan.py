@@ -14,8 +14,8 @@ from wsm_data.readers.source import Container, ContainerScan, DepthSample
 from wsm_data.schema.dataset import CloudColours, DatasetManifest
 from wsm_data.schema.episode import EpisodeRecord
 from wsm_data.schema.identity import EpisodeId
-from wsm_data.schema.layout import Layout
 from wsm_data.schema.point_cloud import PointCloud
+from wsm_data.schema.source.layout import Layout
 from wsm_data.schema.verdict import Refusal
 
 

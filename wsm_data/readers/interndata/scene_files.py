@@ -21,7 +21,7 @@ from wsm_data.readers.interndata.containers import (
     place_of,
 )
 from wsm_data.readers.source import Container
-from wsm_data.schema.layout import Layout
+from wsm_data.schema.source.layout import Layout
 
 _READ_FOLDER = re.compile(r"data|meta|videos|(data|videos)/[^/]+|videos/[^/]+/observation\.images\.(rgb|depth)")
 

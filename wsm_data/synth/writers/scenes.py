@@ -9,7 +9,7 @@ from pathlib import Path
 
 from wsm_data.codecs.ply import ply_bytes
 from wsm_data.files.atomic import write_bytes
-from wsm_data.schema.layout import Layout
+from wsm_data.schema.source.layout import Layout
 from wsm_data.synth.config import SynthConfig
 from wsm_data.synth.home.home import home_glb
 from wsm_data.synth.writers.cloud import with_path

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wsm_data.access.release import Release
-from wsm_data.shards.index import IndexTable
+from wsm_data.shards.index.table import IndexTable
 from wsm_data.shards.names import TRAIN_SPLIT
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from wsm_data.checks.images.depth_values import check_depth_values
 from wsm_data.errors import Reason
-from wsm_data.schema.check_limits import CheckLimits
+from wsm_data.schema.source.check_limits import CheckLimits
 
 UNIT_M = 1e-4
 PLANE_M = (1 / np.linspace(0.2, 0.8, 320)[None] * np.linspace(1.0, 1.4, 240)[:, None]).astype(np.float32)

@@ -21,8 +21,8 @@ from wsm_data.loaders.reading.prefetch import done_alone
 from wsm_data.loaders.reading.step_reader import StepReader
 from wsm_data.loaders.sources.clips import open_sources
 from wsm_data.loaders.timing import Timing
-from wsm_data.shards.index import write_index
-from wsm_data.shards.index_row import IndexRow, row_record
+from wsm_data.shards.index.row import IndexRow, row_record
+from wsm_data.shards.index.table import write_index
 from wsm_data.shards.manifest import manifest_bytes
 
 Damage = Callable[[Path, IndexRow], None]

@@ -5,7 +5,7 @@ import pytest
 
 from wsm_data.errors import ConfigError
 from wsm_data.readers.interndata.containers import Place, find_containers, place_of
-from wsm_data.schema.layout import Layout
+from wsm_data.schema.source.layout import Layout
 
 
 def refuse_listing(monkeypatch, name):

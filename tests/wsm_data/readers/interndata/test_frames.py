@@ -7,7 +7,7 @@ from wsm_data.errors import IntegrityError
 from wsm_data.readers.interndata.containers import find_containers
 from wsm_data.readers.interndata.frames import iter_episode_frames
 from wsm_data.readers.interndata.scan import scan_container
-from wsm_data.schema.layout import Layout
+from wsm_data.schema.source.layout import Layout
 
 
 @pytest.fixture(params=["archive", "scene_folder"])

@@ -28,7 +28,7 @@ def table(
     ] = None,
 ) -> None:
     """Print the paper's figures and those of the evaluations; write them as text, CSV and picture."""
-    from pipelines.operations.eval_table import eval_table
+    from pipelines.operations.evaluating.table import eval_table
 
     eval_table(name.value, evaluations or [], out)
 

@@ -14,8 +14,8 @@ import pyarrow.parquet as pq
 from wsm_data.errors import ConfigError
 from wsm_data.files.arrow_arrays import arrow_numbers, arrow_texts, numpy_of
 from wsm_data.files.atomic import atomic_file
-from wsm_data.shards.index_file import IndexFile
-from wsm_data.shards.index_row import (
+from wsm_data.shards.index.file import IndexFile
+from wsm_data.shards.index.row import (
     COUNT_COLUMNS,
     PLACE_COLUMNS,
     REPEATED_COLUMNS,

@@ -2,7 +2,7 @@ from dataclasses import fields
 
 import pytest
 
-from wsm_data.schema.check_limits import CheckLimits
+from wsm_data.schema.source.check_limits import CheckLimits
 
 
 @pytest.mark.parametrize("name", [field.name for field in fields(CheckLimits)])

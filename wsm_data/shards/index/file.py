@@ -13,7 +13,7 @@ import pyarrow.parquet as pq
 
 from wsm_data.errors import IntegrityError
 from wsm_data.files.tables import opened_table, require_columns
-from wsm_data.shards.index_row import INDEX_VERSION, SCHEMA
+from wsm_data.shards.index.row import INDEX_VERSION, SCHEMA
 from wsm_data.shards.row_blocks import RowBlocks
 
 OpenFile = Callable[[], pa.NativeFile]

@@ -68,7 +68,7 @@ def nav(
     quiet: Quiet = False,
 ) -> None:
     """Drive through episodes and write their table, means with intervals, maps and films."""
-    from pipelines.operations.eval_nav import eval_nav, nav_config
+    from pipelines.operations.evaluating.nav import eval_nav, nav_config
 
     sim = {
         "protocol": protocol.value,

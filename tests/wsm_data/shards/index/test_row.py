@@ -6,7 +6,7 @@ import pytest
 from wsm_data.errors import IntegrityError
 from wsm_data.schema.clip import DEPTH_MEMBERS, Clip
 from wsm_data.shards.fragment import build_fragment
-from wsm_data.shards.index_row import SCHEMA, IndexRow, index_row, parse_row, row_record
+from wsm_data.shards.index.row import SCHEMA, IndexRow, index_row, parse_row, row_record
 from wsm_data.shards.members import MEMBER_NAMES
 
 

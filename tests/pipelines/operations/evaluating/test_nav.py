@@ -1,6 +1,6 @@
 import pytest
 
-from pipelines.operations.eval_nav import describe, eval_nav, nav_config
+from pipelines.operations.evaluating.nav import describe, eval_nav, nav_config
 from wsm_data.errors import ConfigError
 
 SIM = {"protocol": "paper", "goal": "start", "estimated_controller_pose": False, "latency_steps": 2}

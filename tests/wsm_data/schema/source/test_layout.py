@@ -1,7 +1,7 @@
 import pytest
 
 from wsm_data.files.typed_toml import convert
-from wsm_data.schema.layout import Layout
+from wsm_data.schema.source.layout import Layout
 from wsm_data.synth.config import SynthConfig
 
 

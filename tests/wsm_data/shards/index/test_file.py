@@ -8,16 +8,16 @@ import pyarrow.parquet as pq
 import pytest
 
 from wsm_data.errors import IntegrityError
-from wsm_data.shards.index import IndexTable, write_index
-from wsm_data.shards.index_file import IndexFile, local_file
-from wsm_data.shards.index_row import SCHEMA
+from wsm_data.shards.index.file import IndexFile, local_file
+from wsm_data.shards.index.row import SCHEMA
+from wsm_data.shards.index.table import IndexTable, write_index
 from wsm_data.shards.names import INDEX_NAME
 
 
 @pytest.fixture
 def path(tiny: SimpleNamespace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The index of the seven clips in groups of two rows, of which each is kept alone."""
-    monkeypatch.setattr("wsm_data.shards.index._ROW_GROUP_ROWS", 2)
+    monkeypatch.setattr("wsm_data.shards.index.table._ROW_GROUP_ROWS", 2)
     monkeypatch.setattr("wsm_data.shards.row_blocks._BLOCK_ROWS", 2)
     path = tmp_path / "small_groups.parquet"
     write_index(path, pq.read_table(tiny.folder / INDEX_NAME, schema=SCHEMA))

@@ -24,7 +24,7 @@ def eval_slam(
     quiet: Quiet = False,
 ) -> None:
     """Evaluate one system."""
-    from pipelines.operations import eval_slam as operation
+    from pipelines.operations.evaluating import slam as operation
 
     request = operation.SlamRequest(
         model=model, estimates=estimates, split=split, limit=limit, weights=weights, seed=seed

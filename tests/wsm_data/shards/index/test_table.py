@@ -9,8 +9,8 @@ import pytest
 
 from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.schema.clip import MEMBERS
-from wsm_data.shards.index import IndexTable, index_table, parse_index, write_index
-from wsm_data.shards.index_row import SCHEMA
+from wsm_data.shards.index.row import SCHEMA
+from wsm_data.shards.index.table import IndexTable, index_table, parse_index, write_index
 from wsm_data.shards.names import INDEX_NAME
 
 
