@@ -27,7 +27,8 @@ class Baselines:
     """The best constant depth map, and the best linear guess from the last latent.
 
     Attributes:
-        depth_map_m: mean of each pixel's log depth, as metres; float32 [H, W]. None for clips without depth.
+        depth_map_m: mean of each pixel's log depth, as metres; float32 [H, W]. None for clips without depth, or without
+            a pixel that counts.
         shrink: factor of each channel of the last latent, for 1, 2, ... latents ahead; [K, C].
     """
 
@@ -71,7 +72,7 @@ def true_depth(batch: ClipBatch[Tensor], number: int) -> Tensor:
     return batch.depth[batch.spans[number].place].float()
 
 
-def _constant_map(batches: Sequence[ClipBatch[Tensor]], decoding: Decoding) -> Float32Array:
+def _constant_map(batches: Sequence[ClipBatch[Tensor]], decoding: Decoding) -> Float32Array | None:
     total: Float64Array | float = 0.0
     pixels: Float64Array | float = 0.0
     for batch in batches:
@@ -80,6 +81,8 @@ def _constant_map(batches: Sequence[ClipBatch[Tensor]], decoding: Decoding) -> F
             log_depth = np.log(decoding.depth_m(true_depth(batch, number)).astype(np.float64))
             total = total + np.where(counts, log_depth, 0.0).sum(axis=0)
             pixels = pixels + counts.sum(axis=0)
+    if not np.any(pixels):
+        return None
     middle = float(np.sum(total) / np.sum(pixels))  # where a pixel was never measured
     mean = np.divide(total, pixels, out=np.full(np.shape(total), middle), where=np.asarray(pixels) > 0)
     return np.exp(mean).astype(np.float32)

@@ -14,7 +14,7 @@ from wsm_data.errors import DataError
 from wsm_data.metrics.depth import DepthErrors, depth_errors
 from wsm_data.metrics.images import ssim
 from wsm_data.metrics.trajectory import ate_rmse_unaligned_m, ate_sim3
-from wsm_data.schema.arrays import Float32Array, Float64Array
+from wsm_data.schema.arrays import BoolArray, Float32Array, Float64Array
 from wsm_data.schema.batch import ClipBatch
 from wsm_data.schema.sequence import TEMPORAL_RATIO
 from wsm_model.batches import noise_stream
@@ -56,8 +56,8 @@ class StateErrors:
         ate_rmse_constant_velocity_m: of a camera that goes on as it truly began.
         depth_mse: of standardised depth latents.
         mean_depth_mse: of predicting the training mean.
-        depth: of decoded pixels, in metres.
-        constant_map: of the best constant depth map.
+        depth: of decoded pixels, in metres; None where no cell of the clip was measured well enough to count.
+        constant_map: of the best constant depth map; None likewise.
     """
 
     ate_rmse_unaligned_m: float
@@ -66,8 +66,8 @@ class StateErrors:
     ate_rmse_constant_velocity_m: float
     depth_mse: float
     mean_depth_mse: float
-    depth: DepthErrors
-    constant_map: DepthErrors
+    depth: DepthErrors | None
+    constant_map: DepthErrors | None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -154,11 +154,8 @@ def _state_errors(
         for slots in (streamed.poses, batch.poses[place])
     )
     latents = true_depth(batch, number)
-    true_m = settings.decoding.depth_m(latents)
     counts = counted_depth(batch, number, settings.decoding)
-    if settings.baselines.depth_map_m is None:
-        raise ValueError("errors of states need a constant depth map beside them, and the clips had no depth")
-    constant_m = np.broadcast_to(settings.baselines.depth_map_m, true_m.shape)
+    depth, constant_map = _depth_errors(streamed.depth, latents, counts, settings) if counts.any() else (None, None)
     return StateErrors(
         ate_rmse_unaligned_m=ate_rmse_unaligned_m(estimated, true),
         ate_rmse_sim3_m=_ate_rmse_sim3_m(estimated, true),
@@ -166,9 +163,21 @@ def _state_errors(
         ate_rmse_constant_velocity_m=ate_rmse_unaligned_m(constant_velocity(true), true),
         depth_mse=float((streamed.depth - latents).square().mean()),
         mean_depth_mse=float(latents.square().mean()),
-        depth=depth_errors(settings.decoding.depth_m(streamed.depth), true_m, counts),
-        constant_map=depth_errors(constant_m, true_m, counts),
+        depth=depth,
+        constant_map=constant_map,
     )
+
+
+def _depth_errors(
+    estimated: Tensor, true: Tensor, counts: BoolArray, settings: HeldOutSettings
+) -> tuple[DepthErrors, DepthErrors]:
+    """Of the estimated latents [F, C, h, w], and of the constant map."""
+    true_m = settings.decoding.depth_m(true)
+    if settings.baselines.depth_map_m is None:
+        raise ValueError("errors of depth need a constant depth map beside them, and the clips it is of had no depth")
+    constant_m = np.broadcast_to(settings.baselines.depth_map_m, true_m.shape)
+    found = depth_errors(settings.decoding.depth_m(estimated), true_m, counts)
+    return found, depth_errors(constant_m, true_m, counts)
 
 
 def _ate_rmse_sim3_m(estimated: Float64Array, true: Float64Array) -> float | None:

@@ -33,8 +33,9 @@ def _state_means(states: Sequence[StateErrors]) -> dict[str, object]:
         )
     }
     for name in ("abs_rel", "delta1", "log_rmse"):
-        found[f"depth_{name}"] = _mean(getattr(one.depth, name) for one in states)
-        found[f"depth_{name}_constant_map"] = _mean(getattr(one.constant_map, name) for one in states)
+        for guess, suffix in (("depth", ""), ("constant_map", "_constant_map")):
+            errors = [getattr(one, guess) for one in states]
+            found[f"depth_{name}{suffix}"] = _mean(getattr(one, name) for one in errors if one is not None)
     return found
 
 

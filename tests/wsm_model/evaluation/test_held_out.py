@@ -35,6 +35,19 @@ def test_still_frames_that_were_added_do_not_count(still_model, batch, make_sett
     assert [one.ate_rmse_constant_velocity_m for one in before] == [one.ate_rmse_constant_velocity_m for one in after]
 
 
+def test_a_clip_of_which_no_cell_was_half_measured_has_no_depth_error_and_keeps_its_others(
+    still_model, batch, make_settings
+):
+    """Sparse depth is a clip's to have: 127 of 255 is less than half."""
+    batch.depth_valid[0] = 127
+    sparse, dense = (one.states for one in clip_errors(still_model, batch, make_settings()))
+    assert (sparse.depth, sparse.constant_map) == (None, None)
+    assert sparse.ate_rmse_unaligned_m > 0
+    assert dense.depth.abs_rel > dense.constant_map.abs_rel > 0  # an untrained model against the best fit
+    batch.depth_valid[:] = 127
+    assert [one.states.depth for one in clip_errors(still_model, batch, make_settings())] == [None, None]
+
+
 def test_centres_on_one_line_have_no_aligned_error(still_model, batch, make_settings):
     batch.poses[..., 1:3] = 0.0
     assert [one.states.ate_rmse_sim3_m for one in clip_errors(still_model, batch, make_settings())] == [None, None]

@@ -31,6 +31,13 @@ def test_errors_are_means_over_the_clips_that_have_them():
     assert found["depth_delta1"] == pytest.approx(0.6)
 
 
+def test_depth_is_a_mean_over_the_clips_whose_depth_was_measured():
+    unmeasured = replace(CLIP, states=replace(STATES, depth=None, constant_map=None))
+    found = summarise([CLIP, unmeasured])
+    assert (found["depth_abs_rel"], found["depth_abs_rel_constant_map"]) == (0.1, 0.5)
+    assert summarise([unmeasured])["depth_abs_rel"] is None
+
+
 def test_psnr_is_that_of_the_mean_squared_error_and_there_is_none_without_error():
     """Colours span 2: 10 log10(4 / 0.04) = 20 dB; the means of the two clips are 0.04 and 0.4."""
     found = summarise([CLIP, replace(CLIP, dream=replace(DREAM, dream=replace(GUESS, mse=(0.04,), ssim=(0.4,))))])
