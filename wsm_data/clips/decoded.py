@@ -10,7 +10,7 @@ from wsm_data.codecs.depth import depth_m_from_latent_video
 from wsm_data.errors import ConfigError
 from wsm_data.schema.arrays import BoolArray, Float32Array, Uint8Array, require_array
 from wsm_data.schema.clip import Clip
-from wsm_data.schema.sequence import TEMPORAL_RATIO
+from wsm_data.schema.sequence import latent_of
 
 _HALF_MEASURED = 128  # of 255
 
@@ -56,10 +56,13 @@ def decode_video(clip: Clip, codec: VideoCodec, frames: Sequence[int] | None = N
     """
     _require_same_codec(clip, codec)
     chosen = list(range(clip.frame_count)) if frames is None else list(frames)
-    rgb = codec.decode(clip.rgb_latent.astype(np.float32))[chosen]
+    if any(not 0 <= frame < clip.frame_count for frame in chosen):
+        raise IndexError(f"clip {clip.meta.key} has the frames 0 to {clip.frame_count - 1}, found {chosen}")
+    needed = slice(1 + latent_of(max(chosen, default=0)))  # codecs are causal: later latents change no earlier frame
+    rgb = codec.decode(clip.rgb_latent[needed].astype(np.float32))[chosen]
     depth_m = np.zeros(rgb.shape[:3], np.float32)
     if clip.depth_latent is not None:
-        depth_video = codec.decode(clip.depth_latent.astype(np.float32))[chosen]
+        depth_video = codec.decode(clip.depth_latent[needed].astype(np.float32))[chosen]
         depth_m = depth_m_from_latent_video(depth_video, clip.meta.depth_range)
     return DecodedVideo(
         frames=tuple(chosen),
@@ -71,7 +74,7 @@ def decode_video(clip: Clip, codec: VideoCodec, frames: Sequence[int] | None = N
 
 def valid_cells(clip: Clip, frames: Sequence[int]) -> Uint8Array:
     """`depth_valid` of the latent that each raw frame lies in; uint8 [N, h, w], 0 where the clip has no depth."""
-    latents = [-(-frame // TEMPORAL_RATIO) for frame in frames]  # latent j >= 1 covers the raw frames 4j - 3 .. 4j
+    latents = [latent_of(frame) for frame in frames]
     if clip.depth_valid is None:
         return np.zeros((len(latents), *clip.rgb_latent.shape[2:]), np.uint8)
     return clip.depth_valid[latents]

@@ -25,7 +25,7 @@ class EncoderState(Protocol):
 
 
 class VideoCodec(Protocol):
-    """A causal codec: T = 1 + 4k frames to F = 1 + k latents; latent j sees no frame after 4j.
+    """A causal codec: T = 1 + 4k frames to F = 1 + k latents; latent j sees no frame after 4j, no frame a later latent.
 
     Videos are float32 [T, H, W, 3] in [-1, 1], H and W multiples of 32; latents are float32 [F, C, h, w] with
     h = H / 16 and w = W / 16, not standardised.

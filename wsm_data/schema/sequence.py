@@ -27,6 +27,11 @@ def frames_of(latents: int) -> int:
     return 1 + TEMPORAL_RATIO * (latents - 1)
 
 
+def latent_of(frame: int) -> int:
+    """Latent that a raw frame lies in: frame 0 in latent 0, frames 4j - 3 to 4j in latent j."""
+    return -(-frame // TEMPORAL_RATIO)
+
+
 def chunk_bounds(length: int, chunk_size: int) -> list[tuple[int, int]]:
     """First latent and end of every chunk: [(0, 1), (1, 1 + K), ...]."""
     starts = [0, *range(1, length, chunk_size)]

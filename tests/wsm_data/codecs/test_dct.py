@@ -68,6 +68,13 @@ def test_a_prefix_of_a_video_has_a_prefix_of_its_latents_bit_for_bit(noise_video
         assert np.array_equal(CODEC.encode(noise_video[: 1 + 4 * j]), whole[: 1 + j])
 
 
+def test_a_prefix_of_latents_is_decoded_to_a_prefix_of_the_video_bit_for_bit(noise_video):
+    latents = CODEC.encode(noise_video)
+    whole = CODEC.decode(latents)
+    for j in range(3):
+        assert np.array_equal(CODEC.decode(latents[: 1 + j]), whole[: 1 + 4 * j])
+
+
 def test_a_latent_sees_nothing_later_and_nothing_earlier(noise_video):
     changed = noise_video.copy()
     changed[5:] *= -1

@@ -124,6 +124,13 @@ def test_a_prefix_of_a_video_has_a_prefix_of_its_latents(codec, noise_video):
         np.testing.assert_allclose(codec.encode(noise_video[: 1 + 4 * j]), whole[: 1 + j], atol=TOLERANCE["float32"])
 
 
+def test_a_prefix_of_latents_is_decoded_to_a_prefix_of_the_video(codec, noise_video):
+    latents = codec.encode(noise_video)
+    whole = codec.decode(latents)
+    for j in range(3):
+        np.testing.assert_allclose(codec.decode(latents[: 1 + j]), whole[: 1 + 4 * j], atol=TOLERANCE["float32"])
+
+
 def test_one_clip_leaves_no_trace_in_the_next(codec, noise_video, smooth_video):
     before = codec.encode(noise_video)
     codec.encode(smooth_video)

@@ -10,6 +10,7 @@ from wsm_data.access.config import RemoteAccess
 from wsm_data.errors import IntegrityError, StoreError
 from wsm_data.loaders.config import LoaderConfig, OrderConfig, ReadConfig, SourceConfig
 from wsm_data.loaders.loader import ClipLoader
+from wsm_data.schema.batch import BATCH_TENSORS
 
 GIB = 1 << 30
 FOREVER = 10**9
@@ -23,15 +24,7 @@ HARMLESS = [fault for fault in Fault if fault not in (Fault.FORBIDDEN, Fault.HAN
 def step_digest(batch):
     """Everything a training step sees."""
     digest = hashlib.sha256(repr((batch.epoch, batch.step, batch.keys, batch.spans, batch.refs.tolist())).encode())
-    for name in (
-        "rgb",
-        "depth",
-        "depth_valid",
-        "poses",
-        "still",
-        "sequence_id",
-        "goal_camera0_m",
-    ):
+    for name in BATCH_TENSORS:
         digest.update(getattr(batch, name).contiguous().numpy().tobytes())
     return digest.hexdigest()
 

@@ -8,6 +8,7 @@ from wsm_data.schema.sequence import (
     chunk_start,
     frame_table,
     frames_of,
+    latent_of,
 )
 
 
@@ -49,6 +50,7 @@ def test_sequences_that_do_not_fit_are_refused(spans):
 
 def test_a_later_latent_covers_four_frames():
     assert [frames_of(latents) for latents in (1, 2, 3)] == [1, 5, 9]
+    assert [latent_of(frame) for frame in range(9)] == [0, 1, 1, 1, 1, 2, 2, 2, 2]
 
 
 def test_the_place_of_a_sequence_picks_it_out_of_an_array():

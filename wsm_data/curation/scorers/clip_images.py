@@ -7,7 +7,7 @@ import numpy as np
 from wsm_data.codecs.base import VideoCodec
 from wsm_data.schema.arrays import Float16Array, Float32Array, Float64Array, Uint8Array, require_array
 from wsm_data.schema.clip import Clip
-from wsm_data.schema.sequence import TEMPORAL_RATIO
+from wsm_data.shards.statistics import real_latents
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -46,8 +46,7 @@ def images_of(clip: Clip, rgb_std: Float64Array, codec: VideoCodec | None, depth
         codec: decodes single latents of depth on their own; None where the release's codec cannot, or not cheaply.
         depth_samples: how many latents are decoded, spread evenly over the clip.
     """
-    real_frames = clip.meta.frames - clip.meta.padded_frames
-    count = 1 + (real_frames - 1 + TEMPORAL_RATIO - 1) // TEMPORAL_RATIO
+    count = real_latents(clip.meta.frames, clip.meta.padded_frames)
     depth, valid = clip.depth_latent, clip.depth_valid
     wanted = min(depth_samples, count) if codec is not None and depth is not None else 0
     sampled = np.rint((np.arange(wanted) + 0.5) * count / max(wanted, 1) - 0.5).astype(np.int64)
