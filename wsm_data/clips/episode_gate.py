@@ -61,7 +61,7 @@ def check_episode(
     where, checks = record.id.text, dataset.checks
     points_m = _camera_points(record, samples)
     verdicts = {
-        "frames_repeat": check_frames_repeat(record, frames, checks.max_repeated_share),
+        "frames_repeat": check_frames_repeat(record, frames, dataset.depth, checks.max_repeated_share),
         "frames_shown": check_frames_shown(videos.rgb[: record.frame_count, ..., 1], where),
         "colour_order": check_frame_order(videos.rgb[: record.frame_count, ..., 1], "colour", where),
         **check_depth_values(list(samples.depth_m.values()), dataset.depth.metres_per_unit, checks, where),

@@ -5,14 +5,31 @@ import pytest
 
 from wsm_data.checks.images.frames_repeat import check_frames_repeat
 from wsm_data.errors import Reason
+from wsm_data.geometry.camera import pixel_rays
+from wsm_data.schema.camera import Intrinsics
+from wsm_data.schema.depth import DepthEncoding
 from wsm_data.schema.frames import EpisodeFrames
+from wsm_data.synth.writers.images import encode_png_16
 
-RGB = tuple(np.full((2, 3, 3), t, np.uint8) for t in range(10))
-DEPTH = tuple(f"depth {t}".encode() for t in range(10))
+INTRINSICS = Intrinsics(fx=60.0, fy=60.0, cx=39.5, cy=29.5, width=80, height=60)
+STORED = DepthEncoding(metres_per_unit=1e-3, invalid_codes=(0,))
+RGB = tuple(f"colour {t}".encode() for t in range(10))
+DEPTH = tuple(np.full((60, 80), 1000 + t, np.uint16) for t in range(10))
 
 
 def check(record, rgb=RGB, depth=DEPTH, max_share=0.0):
-    return check_frames_repeat(record, EpisodeFrames(rgb=rgb, depth=depth), max_share)
+    record = dataclasses.replace(record, intrinsics=INTRINSICS)
+    return check_frames_repeat(record, EpisodeFrames(rgb=rgb, depth=depth), STORED, max_share)
+
+
+def floor_depth(record, wall_m=np.inf):
+    """A floor without end as frame 0 sees it, and a wall across at x = `wall_m`; codes of 1 mm up to 65 m."""
+    T = record.T_world_camera[0]
+    rays = pixel_rays(INTRINSICS) @ T[:3, :3].T
+    with np.errstate(divide="ignore"):
+        floor_m = np.where(rays[..., 2] < 0, -T[2, 3] / rays[..., 2], np.inf)
+        ahead_m = np.minimum(floor_m, np.where(rays[..., 0] > 0, (wall_m - T[0, 3]) / rays[..., 0], np.inf))
+    return np.where(ahead_m < 65, np.rint(ahead_m * 1000), 0).astype(np.uint16)
 
 
 def test_images_that_all_differ_are_kept(make_record):
@@ -41,3 +58,23 @@ def test_a_camera_that_stands_still_may_show_the_same_again(make_record):
 
 def test_frames_without_depth_are_no_copies_of_one_another(make_record):
     assert check(make_record(frames=10, step_m=0.05), depth=(None,) * 10).keep
+
+
+def test_depth_that_the_motion_leaves_as_it_is_may_repeat_and_colour_may_not(make_record):
+    """A camera 0.5 m over a floor without end, pitched by 10 degrees, sees it the same from everywhere."""
+    record = make_record(frames=10, step_m=0.05)
+    floor = floor_depth(record)
+    for image in (floor, encode_png_16(floor, 1)):  # as pixels, and as a file
+        assert check(record, depth=(image,) * 10).measured["repeated_depth_share"] == 0.0
+    assert check(record, rgb=RGB[:1] * 10, depth=(floor,) * 10).reason is Reason.FRAME_REPEATED
+
+
+def test_depth_that_repeats_where_one_wall_must_come_nearer_is_a_copy(make_record):
+    record = make_record(frames=10, step_m=0.05)
+    verdict = check(record, depth=(floor_depth(record, wall_m=3.0),) * 10)
+    assert verdict.reason is Reason.FRAME_REPEATED
+    assert verdict.measured["repeated_depth_share"] == 0.9  # 9 of 10: by 0.05 m at 3 m they err by 1.7 %
+
+
+def test_depth_without_measurements_does_not_excuse_its_copies(make_record):
+    assert not check(make_record(frames=10, step_m=0.05), depth=(np.zeros((60, 80), np.uint16),) * 10).keep
