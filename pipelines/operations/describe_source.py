@@ -2,23 +2,21 @@
 
 import json
 from collections import Counter
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import typer
 
+from pipelines.operations.soundness.check_source import source_checks
 from pipelines.operations.soundness.source_manifest import fitting_manifests, layouts
 from wsm_data.checks.record import record_refusal
+from wsm_data.clips.soundness import SourceChecks
 from wsm_data.errors import DataError
 from wsm_data.files.json_values import to_json
-from wsm_data.readers.manifest import load_dataset
 from wsm_data.readers.registry import source_reader
-from wsm_data.readers.source import Container, ContainerScan
-from wsm_data.schema.dataset import DatasetManifest
+from wsm_data.readers.source import Container
+from wsm_data.schema.episode import EpisodeRecord
 from wsm_data.schema.verdict import Refusal
-
-_DEPTH_SAMPLE_EVERY = 10
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,17 +72,18 @@ def describe_source(source: Path, dataset: str, limit: int) -> SourceDescription
         ConfigError: as `show_source`.
     """
     fits = [dataset] if dataset else fitting_manifests(source)
-    manifest = load_dataset(fits[0])
+    checks = source_checks(source, fits[0])
+    manifest = checks.dataset
     containers = source_reader(manifest).find_containers(source, manifest)
     read = containers[:limit] if limit else containers
-    scans, refusals = _scans(source, read, manifest)
-    kept = []
-    for record in (record for scan in scans for record in scan.records):
-        refusal = record_refusal(record, manifest)
-        if refusal is None:
-            kept.append(record)
-        else:
-            refusals.append(refusal)
+    kept: list[EpisodeRecord] = []
+    refusals: list[Refusal] = []
+    with_cloud = 0
+    for container in read:
+        records, refused, has_cloud = _read(container, checks)
+        kept += records
+        refusals += refused
+        with_cloud += has_cloud
     cameras = [(one.id.camera, one.intrinsics) for one in kept]
     return SourceDescription(
         dataset=manifest.name,
@@ -95,26 +94,22 @@ def describe_source(source: Path, dataset: str, limit: int) -> SourceDescription
         trajectories=len(kept),
         frames=sum(record.frame_count for record in kept),
         cameras=dict(Counter(f"{name} {K.width} x {K.height} px, fx {K.fx:g}" for name, K in cameras)),
-        with_cloud=sum(scan.cloud is not None for scan in scans),
+        with_cloud=with_cloud,
         notes=dict(Counter(note for record in kept for note in record.notes)),
         refusals=tuple(refusals),
     )
 
 
-def _scans(
-    source: Path, containers: Sequence[Container], dataset: DatasetManifest
-) -> tuple[list[ContainerScan], list[Refusal]]:
-    scans: list[ContainerScan] = []
-    refusals: list[Refusal] = []
-    for container in containers:
-        try:
-            scan = source_reader(dataset).scan(source, container, dataset, _DEPTH_SAMPLE_EVERY)
-        except DataError as error:
-            refusals.append(Refusal.from_error(container.id, container.id, error))
-            continue
-        scans.append(scan)
-        refusals += [*scan.refusals, *([scan.cloud_refusal] if scan.cloud_refusal else [])]
-    return scans, refusals
+def _read(container: Container, checks: SourceChecks) -> tuple[list[EpisodeRecord], list[Refusal], bool]:
+    """The usable records of a container, what would be refused, and whether there is a cloud, which is let go."""
+    try:
+        scan = source_reader(checks.dataset).scan(checks.source, container, checks.dataset, checks.depth_sample_every)
+    except DataError as error:
+        return [], [Refusal.from_error(container.id, container.id, error)], False
+    refusals = [*scan.refusals, *([scan.cloud_refusal] if scan.cloud_refusal else [])]
+    told = [(record, record_refusal(record, checks.dataset)) for record in scan.records]
+    refusals += [refusal for _, refusal in told if refusal]
+    return [record for record, refusal in told if refusal is None], refusals, scan.cloud is not None
 
 
 def _lines(found: SourceDescription) -> list[str]:

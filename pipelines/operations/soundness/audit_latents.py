@@ -5,18 +5,17 @@ from pathlib import Path
 
 from tqdm import tqdm
 
+from pipelines.operations.soundness.check_source import source_checks
 from pipelines.operations.soundness.findings import FindingsReport, Telling, tell
 from pipelines.operations.soundness.source_manifest import fitting_manifests
 from wsm_data.access.release import Release, open_release
 from wsm_data.clips.latent_audit import AuditedClip, audit_latents
-from wsm_data.clips.soundness import CheckedUnit
+from wsm_data.clips.soundness import CheckedUnit, SourceChecks
 from wsm_data.codecs.base import VideoCodec
 from wsm_data.errors import ConfigError, DataError, Reason
 from wsm_data.files.digest import sha256_bytes
-from wsm_data.readers.manifest import load_dataset
 from wsm_data.readers.registry import source_reader
 from wsm_data.readers.source import Container
-from wsm_data.schema.dataset import DatasetManifest
 from wsm_data.schema.verdict import Verdict
 from wsm_data.shards.index.row import IndexRow
 from wsm_data.shards.release_codec import codec_of
@@ -44,11 +43,11 @@ def audit_release_latents(
     release = open_release(location)
     codec = codec_of(release.manifest, weights)
     name = dataset or fitting_manifests(source)[0]
-    manifest = load_dataset(name)
+    checks = source_checks(source, name)
     wanted = {row.unit: row for row in sampled_rows(release, share)}
     units = []
     with tqdm(total=len(wanted), unit="clip", desc="audit-latents", disable=telling.quiet, dynamic_ncols=True) as bar:
-        for unit in _audited(release, source, manifest, codec, wanted):
+        for unit in _audited(release, checks, codec, wanted):
             units.append(unit)
             bar.update()
     units += [_absent(text, source) for text in sorted({*wanted} - {unit.unit for unit in units})]
@@ -64,16 +63,20 @@ def sampled_rows(release: Release, share: float) -> list[IndexRow]:
 
 
 def _audited(
-    release: Release, source: Path, dataset: DatasetManifest, codec: VideoCodec, wanted: dict[str, IndexRow]
+    release: Release, checks: SourceChecks, codec: VideoCodec, wanted: dict[str, IndexRow]
 ) -> Iterator[CheckedUnit]:
-    """Verdicts on the wanted clips that the source has, container by container, until all are found."""
+    """Verdicts on the wanted clips that the source has, container by container, until all are found.
+
+    A container is scanned as a run does: the floor, and with it a digest, may follow from the depth that is sampled.
+    """
+    source, dataset = checks.source, checks.dataset
     reader = source_reader(dataset)
     left = dict(wanted)
     for container in _likeliest_first(reader.find_containers(source, dataset), list(wanted.values())):
         if not left:
             return
         try:
-            scan = reader.scan(source, container, dataset, dataset.limits.max_frames)
+            scan = reader.scan(source, container, dataset, checks.depth_sample_every)
         except DataError:
             continue  # whatever it held is told to be absent
         records = [record for record in scan.records if record.id.text in left]

@@ -8,14 +8,15 @@ from pathlib import Path
 
 from tqdm import tqdm
 
+from pipelines.operations.soundness.check_source import source_checks
 from pipelines.operations.soundness.findings import FindingsReport, Telling, tell
 from pipelines.operations.soundness.source_manifest import fitting_manifests
 from pipelines.running.engines.local import run_local
 from pipelines.stages.index import count_differences
+from wsm_data.clips.soundness import SourceChecks
 from wsm_data.errors import ConfigError, DataError, Reason
 from wsm_data.files.atomic import write_text
 from wsm_data.files.digest import sha256_bytes
-from wsm_data.readers.manifest import load_dataset
 from wsm_data.readers.registry import source_reader
 from wsm_data.readers.source import Container, Preflight
 from wsm_data.schema.dataset import DatasetManifest
@@ -38,9 +39,8 @@ NOT_MENDED_BY_FETCHING = frozenset(
 
 @dataclass(frozen=True, kw_only=True)
 class _Task:
-    source: Path
     container: Container
-    dataset: DatasetManifest
+    checks: SourceChecks
     walk: bool
 
 
@@ -64,9 +64,10 @@ def preflight(
     if not 0 <= share <= 1:
         raise ConfigError(f"--sample must lie in [0, 1], found {share}")
     name = dataset or fitting_manifests(source)[0]
-    manifest = load_dataset(name)
+    checks = source_checks(source, name)
+    manifest = checks.dataset
     containers = source_reader(manifest).find_containers(source, manifest)
-    tasks = [_Task(source=source, container=one, dataset=manifest, walk=_chosen(one, share)) for one in containers]
+    tasks = [_Task(container=one, checks=checks, walk=_chosen(one, share)) for one in containers]
     done = []
     with tqdm(total=len(tasks), unit="container", desc="preflight", disable=telling.quiet, dynamic_ncols=True) as bar:
         for found in run_local(tasks, _look, workers or os.cpu_count() or 1):
@@ -87,9 +88,10 @@ def _chosen(container: Container, share: float) -> bool:
 
 
 def _look(task: _Task) -> Iterator[Preflight]:
-    reader = source_reader(task.dataset)
+    source, dataset = task.checks.source, task.checks.dataset
+    reader = source_reader(dataset)
     if reader.preflight is not None:
-        yield reader.preflight(task.source, task.container, task.dataset, task.walk)
+        yield reader.preflight(source, task.container, dataset, task.walk)
     elif not task.walk:
         yield Preflight(unit=task.container.id, walked=False)
     else:
@@ -97,11 +99,11 @@ def _look(task: _Task) -> Iterator[Preflight]:
 
 
 def _scanned(task: _Task) -> Preflight:
-    """What the first pass of a run says; it keeps no depth image but the first."""
-    unit = task.container.id
+    """What the first pass of a run says; it looks for the floor in as many depth images as that."""
+    unit, checks = task.container.id, task.checks
     try:
-        scan = source_reader(task.dataset).scan(
-            task.source, task.container, task.dataset, task.dataset.limits.max_frames
+        scan = source_reader(checks.dataset).scan(
+            checks.source, task.container, checks.dataset, checks.depth_sample_every
         )
     except DataError as error:
         return Preflight(unit=unit, walked=True, refusals=(Refusal.from_error(unit, unit, error),))

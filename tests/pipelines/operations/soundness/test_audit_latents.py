@@ -1,5 +1,7 @@
 import json
 import shutil
+import sys
+from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
@@ -7,6 +9,11 @@ from typer.testing import CliRunner
 from pipelines.cli import app
 from pipelines.operations.soundness.audit_latents import sampled_rows
 from wsm_data.access.release import open_release
+from wsm_data.readers.arrays import write_episode
+
+sys.path.insert(0, str(Path(__file__).parents[3] / "wsm_data" / "fakes"))
+
+from hand_held import CAMERA, walk_frames
 
 
 @pytest.fixture(scope="module")
@@ -21,8 +28,8 @@ def release(source, run_pipeline, tmp_path_factory):
     return out / "pack" / "release"
 
 
-def audit(release, source, *words):
-    words = ["audit-latents", str(release), "--source", str(source), "--dataset", "synthetic", *words, "--quiet"]
+def audit(release, source, *words, dataset="synthetic"):
+    words = ["audit-latents", str(release), "--source", str(source), "--dataset", dataset, *words, "--quiet"]
     return CliRunner(env={"GITHUB_ACTIONS": ""}).invoke(app, words)
 
 
@@ -48,3 +55,12 @@ def test_a_share_takes_at_least_one_clip_and_the_same_ones_of_a_larger_share(rel
     few, all_ = (sampled_rows(opened, share) for share in (1e-6, 1.0))
     assert len(few) == 1
     assert all_[:1] == few
+
+
+def test_a_floor_that_a_run_found_in_depth_is_found_again(run_pipeline, tmp_path):
+    """It is part of the digest of a trajectory, and follows from the depth images that are sampled."""
+    write_episode(tmp_path / "source", "home", "one", walk_frames(60), K=CAMERA.matrix, camera="cam")
+    settings = {"index": {"dataset": "arrays", "depth_sample_every": 3}, "split": {"test_fraction": 0.0}}
+    run_pipeline(tmp_path / "source", tmp_path / "run", settings=settings)
+    done = audit(tmp_path / "run" / "pack" / "release", tmp_path / "source", dataset="arrays")
+    assert done.exit_code == 0, done.output
