@@ -1,8 +1,9 @@
 """`wsm pack`: clips into shards, shards into a release."""
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from pathlib import Path
 
 from pipelines.artifacts.inventory import account_of
@@ -65,6 +66,17 @@ class PackConfig:
             raise ValueError(f"shard_mib must be at least 1, found {self.shard_mib}")
 
 
+@dataclass(frozen=True, kw_only=True)
+class _Shard:
+    """What the worker of a shard needs: its clips in their order, and what became of each by its key; it pickles.
+
+    The ledger of `encode` has a line for every clip of the release, which no shard should have to read.
+    """
+
+    layout: ShardLayout
+    clips: Mapping[str, Outcome]
+
+
 def _list_units(config: PackConfig) -> Sequence[Unit]:
     for name in ("index", "split", "map", "encode"):
         require_stage(getattr(config, name), name)
@@ -75,13 +87,13 @@ def _list_units(config: PackConfig) -> Sequence[Unit]:
         PlacedClip(key=EpisodeId.parse(name).key, split=splits[name], size_bytes=outcome.facts["bytes"])
         for name, outcome in outcomes.items()
     ]
-    digests = {EpisodeId.parse(name).key: outcome.digest for name, outcome in outcomes.items()}
+    by_key = {EpisodeId.parse(name).key: outcome for name, outcome in outcomes.items()}
     layouts = lay_out_shards(clips, shard_bytes=config.shard_mib << 20, seed=config.seed)
     return [
         Unit(
             id=layout.name,
-            inputs={"clips": digest_json([[one.key, digests[one.key]] for one in layout.clips])},
-            payload=layout,
+            inputs={"clips": digest_json([[one.key, by_key[one.key].digest] for one in layout.clips])},
+            payload=_Shard(layout=layout, clips={one.key: by_key[one.key] for one in layout.clips}),
         )
         for layout in layouts
     ]
@@ -121,36 +133,37 @@ def _require_complete(config: PackConfig) -> None:
 
 def _process(batch: Sequence[Unit], config: PackConfig, context: StageContext) -> Iterator[Outcome]:
     release = release_folder(context.out)
-    path_of = _fragment_paths(config)
     for unit in batch:
-        layout: ShardLayout = unit.payload
-        path = release / layout.name
-        shard = write_shard(path, layout, path_of)
+        packed: _Shard = unit.payload
+        path = release / packed.layout.name
+        shard = write_shard(path, packed.layout, partial(_fragment, config.encode, packed.clips))
         facts = {"clips": shard.clips, "bytes": shard.bytes, "shard": asdict(shard)}
         yield Outcome(unit=unit.id, digest=shard.sha256, outputs=(str(path.relative_to(context.out)),), facts=facts)
 
 
-def _fragment_paths(config: PackConfig) -> Callable[[str], Path]:
-    """Finds the fragment of a clip by its key, and holds it and its sidecar against what `encode` wrote."""
-    folder = clips_folder(config.encode)
-    outcomes = {EpisodeId.parse(name).key: outcome for name, outcome in done_outcomes(config.encode).items()}
+def _fragment(encode: Path, clips: Mapping[str, Outcome], key: str) -> Path:
+    """The fragment of a clip, where it and its sidecar are as `encode` wrote them."""
+    path = fragment_path(clips_folder(encode), key)
+    for file in (path, path.with_suffix(SIDECAR_SUFFIX)):
+        vouched_by_ledger(encode, clips[key], file)
+    return path
 
-    def path_of(key: str) -> Path:
-        path = fragment_path(folder, key)
-        for file in (path, path.with_suffix(SIDECAR_SUFFIX)):
-            vouched_by_ledger(config.encode, outcomes[key], file)
-        return path
 
-    return path_of
+def _sidecar(encode: Path, clips: Mapping[str, Outcome], key: str) -> FragmentInfo:
+    """The sidecar of a clip, where it is as `encode` wrote it; its fragment is not read."""
+    path = fragment_path(clips_folder(encode), key)
+    vouched_by_ledger(encode, clips[key], path.with_suffix(SIDECAR_SUFFIX))
+    return read_fragment_info(path)
 
 
 def _finish(config: PackConfig, context: StageContext, settled: Settled) -> Finished:
     """Write index, inventory and manifest once every shard stands."""
     if settled.pending:
         return Finished()
-    layouts = [unit.payload for unit in _list_units(config)]
+    shards: list[_Shard] = [unit.payload for unit in _list_units(config)]
+    layouts = [shard.layout for shard in shards]
+    by_key = {key: outcome for shard in shards for key, outcome in shard.clips.items()}
     clips = _clips(config)
-    sidecar_of = _sidecars(config, clips)
     digests = {name: outcome.facts["source_digest"] for name, outcome in clips.items()}
     account = account_of(config.index, config.encode, read_split(config.split), digests)
     finish_release(
@@ -158,26 +171,13 @@ def _finish(config: PackConfig, context: StageContext, settled: Settled) -> Fini
         _facts(config, clips),
         layouts=layouts,
         shards=[ShardInfo(**settled.outcomes[layout.name].facts["shard"]) for layout in layouts],
-        read_info=sidecar_of,
+        read_info=partial(_sidecar, config.encode, by_key),
         inventory=account.rows,
         refusals=account.quarantine,
     )
     written = (INDEX_NAME, INVENTORY_NAME, QUARANTINE_NAME, MANIFEST_NAME)
     release = release_folder(context.out).relative_to(context.out)
     return Finished(outputs=tuple(str(release / name) for name in written))
-
-
-def _sidecars(config: PackConfig, clips: Mapping[str, Outcome]) -> Callable[[str], FragmentInfo]:
-    """Reads the sidecar of a clip by its key, where it is as `encode` wrote it; its fragment is not read."""
-    folder = clips_folder(config.encode)
-    outcomes = {EpisodeId.parse(name).key: outcome for name, outcome in clips.items()}
-
-    def read(key: str) -> FragmentInfo:
-        path = fragment_path(folder, key)
-        vouched_by_ledger(config.encode, outcomes[key], path.with_suffix(SIDECAR_SUFFIX))
-        return read_fragment_info(path)
-
-    return read
 
 
 def _facts(config: PackConfig, clips: Mapping[str, Outcome]) -> ReleaseFacts:

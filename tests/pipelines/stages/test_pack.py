@@ -49,9 +49,9 @@ def test_every_shard_is_a_unit_and_its_input_the_clips_in_their_order(finished):
     units = finished.units("pack")
     index = open_release(finished.release).index
     stored = {name: [row.key for row in index.rows_of_shard(name)] for name in units}
-    assert {name: [clip.key for clip in unit.payload.clips] for name, unit in units.items()} == stored
+    assert {name: [clip.key for clip in unit.payload.layout.clips] for name, unit in units.items()} == stored
     assert sum(len(keys) for keys in stored.values()) == 5
-    assert {unit.payload.split for unit in units.values()} == {"train", "test"}
+    assert {unit.payload.layout.split for unit in units.values()} == {"train", "test"}
 
 
 def test_a_changed_clip_changes_the_shard_it_is_in_alone(encoded, changed):
@@ -67,7 +67,7 @@ def test_another_seed_is_another_order_and_another_split_another_shard(encoded, 
     assert any(changed(before, encoded.inputs("pack", seed=seed)) for seed in range(1, 5))
     encoded.run("split", options={"fork": True}, test_fraction=0.0)
     (forked,) = [path for path in encoded.run_folder.iterdir() if path.name.startswith("split-")]
-    assert {unit.payload.split for unit in encoded.units("pack", split=forked).values()} == {"train"}
+    assert {unit.payload.layout.split for unit in encoded.units("pack", split=forked).values()} == {"train"}
 
 
 def test_shards_are_filled_up_to_their_size(make_pipeline):
@@ -77,9 +77,9 @@ def test_shards_are_filled_up_to_their_size(make_pipeline):
     pipeline.run_to("encode")
     sizes = [outcome.facts["bytes"] for outcome in pipeline.outcomes("encode").values()]
     assert max(sizes) * 3 < 1 << 20 < sum(sizes)  # three of them fit into a shard of 1 MiB, and not all four
-    clips = [len(unit.payload.clips) for unit in pipeline.units("pack", shard_mib=1).values()]
+    clips = [len(unit.payload.layout.clips) for unit in pipeline.units("pack", shard_mib=1).values()]
     assert clips == [3, 1]
-    assert [len(unit.payload.clips) for unit in pipeline.units("pack", shard_mib=2).values()] == [4]
+    assert [len(unit.payload.layout.clips) for unit in pipeline.units("pack", shard_mib=2).values()] == [4]
 
 
 def test_a_shard_without_room_is_refused():
