@@ -32,11 +32,11 @@ def nav_config(
     """Settings of an evaluation.
 
     Args:
-        planner: its name.
+        planner: its name, or the URL of a server.
         model: folder of the agent's model.
         codec_weights: folder of the weights of its codec.
-        world: `homes`, or a folder of episodes.
-        seed: of homes and episodes.
+        world: `homes`, `miniworld`, or a folder of episodes.
+        seed: of scenes and episodes.
         episodes_per_scene: how many.
         sim: settings of the simulation that have options of their own.
         assignments: `sim.KEY=value` and `agent.KEY=value` words; what an option says stands.
@@ -48,7 +48,9 @@ def nav_config(
     if unknown := sorted({*words} - {"sim", AGENT}):
         raise ConfigError(f"--set takes sim.KEY=value and agent.KEY=value, found the section {unknown[0]!r}")
     given = words.get("sim", {})
-    if isinstance(given, Mapping) and (both := sorted({*given} & {*sim})):
+    if not isinstance(given, Mapping):
+        raise ConfigError(f"--set takes sim.KEY=value, found sim={given}")
+    if both := sorted({*given} & {*sim}):
         raise ConfigError(f"sim.{both[0]} has an option of its own; see `wsm eval nav --help`")
     return NavConfig(
         planner=planner,
@@ -57,7 +59,7 @@ def nav_config(
         world=world,
         seed=seed,
         episodes_per_scene=episodes_per_scene,
-        sim=build_config(SimConfig, merge(words, {"sim": sim})["sim"], "sim"),  # type: ignore[arg-type]
+        sim=build_config(SimConfig, merge(given, sim), "sim"),
         agent=_agent_config(planner, words.get(AGENT)),
     )
 

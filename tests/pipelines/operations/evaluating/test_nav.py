@@ -19,6 +19,7 @@ def test_options_and_words_become_settings(tmp_path):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
+        (["sim=1"], "takes sim.KEY=value, found sim=1"),
         (["speed=1"], "found the section 'speed'"),
         (["sim.latency_steps=1"], "sim.latency_steps has an option of its own"),
         (["sim.max_sped=1"], "did you mean sim.max_speed"),
