@@ -14,6 +14,8 @@ if TYPE_CHECKING:  # built-in planners are evaluated without torch
     from wsm_model.agent.config import AgentConfig
 
 AGENT = "agent"
+WORLDS = {"homes": "home", "miniworld": "miniworld"}
+"""Worlds that are generated, with the first word of their scenes' names; a folder of the same name is not looked at."""
 _SAY_THEIR_POSE = ("map-and-plan", "map-and-plan-estimated", AGENT)
 
 
@@ -64,7 +66,7 @@ def fixed_settings(config: NavConfig) -> dict[str, object]:
     """What all episodes of a folder share: every setting, and the content of the model and of the episodes' files."""
     settings = dict(to_json(config))
     settings["model"] = None if config.model is None else _digest(config.model / "model.json")
-    if Path(config.world).is_dir():
+    if config.world not in WORLDS:
         settings["world"] = {path.parent.name: _digest(path) for path in episode_files(Path(config.world))}
     return settings
 

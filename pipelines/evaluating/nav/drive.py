@@ -30,7 +30,7 @@ class SceneTask:
     Attributes:
         config: settings.
         scene: the scene.
-        numbers: episodes that are to be driven.
+        numbers: episodes that are to be driven; none where the map alone is missing.
         before: those of the scene that were driven before.
         picture: where the map with the ways of all goes.
         films: where the films of some of them go, by number.
@@ -88,6 +88,7 @@ def drive_scene(task: SceneTask) -> Iterator[Driven]:
     world = open_world(task.scene, task.config.sim)
     episodes = scene_episodes(task.scene, world, task.config)
     driven = list(task.before)
+    task.picture.unlink(missing_ok=True)  # who is cut short after the last episode leaves no map that lacks its way
     for number in task.numbers:
         if number >= len(episodes):
             raise ConfigError(

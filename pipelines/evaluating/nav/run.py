@@ -77,7 +77,7 @@ def evaluate_navigation(
 def pending_tasks(
     config: NavConfig, planned: Planned, done: Mapping[str, Driven], out: Path, films: int
 ) -> list[SceneTask]:
-    """A task for each scene in which an episode is to be driven, has no film and shall, or which has no map yet."""
+    """A task for each scene in which an episode is to be driven, has no film and shall, or which has no map."""
     units = [(scene, number) for scene, numbers in planned for number in numbers]
     shown = {unit_name(scene.name, number) for scene, number in units[:films]}
     tasks = []
@@ -86,10 +86,9 @@ def pending_tasks(
         paths = {number: out / "episodes" / f"{name}.mp4" for number, name in names.items() if name in shown}
         missing = {number: path for number, path in paths.items() if not path.exists()}
         picture = out / "maps" / f"{scene.name}.png"
-        again = {*missing, *(() if picture.exists() else numbers[-1:])}
-        pending = tuple(number for number in numbers if names[number] not in done or number in again)
+        pending = tuple(number for number in numbers if names[number] not in done or number in missing)
         before = tuple(done[names[number]] for number in numbers if number not in pending)
-        if pending:
+        if pending or not picture.exists():
             tasks.append(
                 SceneTask(config=config, scene=scene, numbers=pending, before=before, picture=picture, films=missing)
             )

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from pipelines.evaluating.nav.config import NavConfig, episode_files
+from pipelines.evaluating.nav.config import WORLDS, NavConfig, episode_files
 from wsm_data.errors import ConfigError
 from wsm_data.schema.camera import Intrinsics
 from wsm_data.schema.dataset import Robot
@@ -20,7 +20,6 @@ _MAKERS: Mapping[str, Callable[[int, int, Robot, float, Intrinsics], World]] = {
     "miniworld": make_miniworld,
 }
 """Makes scene number n of a seed, by the first word of its name."""
-_WORLDS = {"homes": "home", "miniworld": "miniworld"}
 _NAME = re.compile(rf"({'|'.join(_MAKERS)})_([0-9]+)_([0-9]{{4,}})")
 _FREE_M = 0.1
 """Generated episodes start and end so far from obstacles, beyond the robot's radius, m."""
@@ -51,17 +50,18 @@ class Scene:
 def list_scenes(config: NavConfig, episodes: int) -> list[tuple[Scene, tuple[int, ...]]]:
     """Scenes with the numbers of their episodes, so many episodes in all; more of them only add to the list.
 
+    A folder's scenes may be fewer than that takes: then there are fewer episodes.
+
     Raises:
-        ConfigError: there is no such world, its files are not of its scenes, or hold fewer episodes.
+        ConfigError: there is no such world, or its files are not of scenes that can be generated.
     """
     per_scene = config.episodes_per_scene
     counts = [min(per_scene, episodes - start) for start in range(0, episodes, per_scene)]
-    if config.world in _WORLDS:
-        kind = _WORLDS[config.world]
+    if config.world in WORLDS:
+        kind = WORLDS[config.world]
         scenes: Sequence[Scene] = [Scene(kind=kind, seed=config.seed, index=index) for index in range(len(counts))]
     else:
         scenes = _scenes_of_folder(Path(config.world))
-        counts = counts[: len(scenes)]
     return [(scene, tuple(range(count))) for scene, count in zip(scenes, counts, strict=False)]
 
 
@@ -75,7 +75,7 @@ def scene_episodes(scene: Scene, world: World, config: NavConfig) -> tuple[Episo
     """All episodes of a scene, by their numbers.
 
     Raises:
-        ConfigError: the scene is too small for any, or a file holds fewer than are asked for.
+        ConfigError: the scene is too small for any.
         IntegrityError: a file does not hold episodes.
     """
     count, robot = config.episodes_per_scene, config.sim.robot
@@ -88,7 +88,7 @@ def _scenes_of_folder(folder: Path) -> list[Scene]:
     files = episode_files(folder) if folder.is_dir() else []
     if not files:
         raise ConfigError(
-            f"--world must be {', '.join(_WORLDS)}, or a folder of SCENE/pointgoal_start_goal_pairs.npy files, found "
+            f"--world must be {', '.join(WORLDS)}, or a folder of SCENE/pointgoal_start_goal_pairs.npy files, found "
             f"{str(folder)!r}"
         )
     found = []

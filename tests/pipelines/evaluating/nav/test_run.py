@@ -2,12 +2,13 @@
 
 import json
 import threading
+from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from pipelines.evaluating.nav import run
+from pipelines.evaluating.nav import drive, run
 from pipelines.evaluating.nav.config import NavConfig
 from pipelines.evaluating.nav.run import evaluate_navigation
 from wsm_data.errors import ConfigError, IntegrityError
@@ -62,6 +63,41 @@ def test_what_is_done_is_not_done_again_and_more_episodes_go_on(tmp_path, opened
     assert opened == ["home_7_0001"]
     evaluate(make_config(), tmp_path / "whole", 4)
     assert outputs(tmp_path / "out") == outputs(tmp_path / "whole")
+
+
+def test_a_map_that_is_missing_is_drawn_without_driving_again(tmp_path, opened, make_config):
+    evaluate(make_config(), tmp_path, 2)
+    path, record = tmp_path / "maps" / "home_7_0000.png", (tmp_path / "driven.jsonl").read_bytes()
+    drawn = path.read_bytes()
+    path.unlink()
+    evaluate(make_config(), tmp_path, 2)
+    assert (path.read_bytes(), (tmp_path / "driven.jsonl").read_bytes()) == (drawn, record)
+
+
+def test_an_evaluation_cut_short_before_its_map_leaves_none_that_lacks_a_way(
+    tmp_path, opened, make_config, monkeypatch
+):
+    def broken(*_):
+        raise KeyboardInterrupt
+
+    evaluate(make_config(), tmp_path / "whole", 2)
+    evaluate(make_config(), tmp_path / "cut", 1)
+    draw = drive.draw_paths
+    monkeypatch.setattr(drive, "draw_paths", broken)
+    with pytest.raises(KeyboardInterrupt):
+        evaluate(make_config(), tmp_path / "cut", 2)
+    monkeypatch.setattr(drive, "draw_paths", draw)
+    evaluate(make_config(), tmp_path / "cut", 2)
+    maps = [(tmp_path / name / "maps" / "home_7_0000.png").read_bytes() for name in ("whole", "cut")]
+    assert maps[0] == maps[1]
+
+
+def test_a_folder_named_as_a_generated_world_is_not_its_content(tmp_path, opened, make_config, monkeypatch):
+    """The folder of the evaluation itself, most of all: it is there when the settings are compared again."""
+    monkeypatch.chdir(tmp_path)
+    for _ in range(2):
+        evaluate(make_config(), Path("homes"), 1)
+    assert json.loads(Path("homes/settings.json").read_text())["world"] == "homes"
 
 
 @pytest.mark.slow
