@@ -7,21 +7,21 @@ from pathlib import Path
 import typer
 from tqdm import tqdm
 
+from pipelines.evaluating.nav.config import NavConfig
+from pipelines.evaluating.nav.scenes import list_scenes, open_world, scene_episodes
 from wsm_data.errors import ConfigError, DataError
 from wsm_data.geometry.planar import camera_over
 from wsm_data.planners.registry import PlannerConfig, make_planner
 from wsm_data.readers.arrays import Frame, write_episode
 from wsm_data.sim.config import SimConfig
 from wsm_data.sim.environment import Environment
-from wsm_data.sim.episodes import Episode, make_episodes
+from wsm_data.sim.episodes import Episode
 from wsm_data.sim.loop import run_episodes
-from wsm_data.sim.miniworld.world import make_miniworld
 from wsm_data.sim.result import Rollout
 from wsm_data.sim.world import World
 
 CAMERA = "zed"
-_FREE_M = 0.1
-"""Drives start and end so far from obstacles, beyond the robot's radius, m."""
+_EXPERT = "oracle"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,7 +40,7 @@ class RecordRequest:
 
 
 def record_miniworld(out: Path, request: RecordRequest, sim: SimConfig, *, quiet: bool) -> None:
-    """Drive the expert through every scene, and write each drive that arrives as an episode.
+    """Drive the expert through the episodes that `wsm eval nav` has, and write each that arrives.
 
     Args:
         out: root of the source.
@@ -51,18 +51,19 @@ def record_miniworld(out: Path, request: RecordRequest, sim: SimConfig, *, quiet
     Raises:
         ConfigError: MiniWorld or OpenGL without a screen is missing, or no drive arrived.
     """
-    recorded = 0
-    with tqdm(total=request.scenes * request.episodes, unit="drive", disable=quiet, dynamic_ncols=True) as bar:
-        for index in range(request.scenes):
-            world = make_miniworld(request.seed, index, sim.robot, sim.camera_height_m, sim.intrinsics)
-            clearance_m = sim.robot.radius_m + _FREE_M
-            drives = make_episodes(world.grid, request.episodes, clearance_m, request.seed + index)
-            for number, drive in enumerate(drives):
+    recorded, total = 0, request.scenes * request.episodes
+    config = NavConfig(
+        planner=_EXPERT, world="miniworld", seed=request.seed, episodes_per_scene=request.episodes, sim=sim
+    )
+    with tqdm(total=total, unit="drive", disable=quiet, dynamic_ncols=True) as bar:
+        for scene, _ in list_scenes(config, total):
+            world = open_world(scene, sim)
+            for number, drive in enumerate(scene_episodes(scene, world, config)):
                 recorded += _record(out, world, number, drive, sim)
                 bar.update()
     if not recorded:
         raise ConfigError(f"no drive arrived of {request.scenes} x {request.episodes}; take another --seed, or more")
-    typer.echo(f"{out}: {recorded} of {request.scenes * request.episodes} drives arrived and were recorded")
+    typer.echo(f"{out}: {recorded} of {total} drives arrived and were recorded")
     typer.echo(f"next: wsm run arrays --set source={out} --out RUN")
 
 
@@ -72,7 +73,7 @@ def _record(out: Path, world: World, number: int, drive: Episode, sim: SimConfig
         environment = Environment(world, number, drive, sim)
     except DataError:  # a start that touches something, or a goal behind a wall, is no drive
         return False
-    (rollout,) = run_episodes(make_planner("oracle", PlannerConfig(robot=sim.robot)), [environment], sim, 1)
+    (rollout,) = run_episodes(make_planner(_EXPERT, PlannerConfig(robot=sim.robot)), [environment], sim, 1)
     if not rollout.success:
         return False
     K = sim.intrinsics.matrix

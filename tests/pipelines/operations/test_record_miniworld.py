@@ -37,7 +37,7 @@ class Corridor:
 
 
 def test_drives_that_arrive_become_episodes_with_the_poses_of_the_robots_camera(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(recording, "make_miniworld", lambda seed, index, *_: Corridor(index))
+    monkeypatch.setattr(recording, "open_world", lambda scene, _: Corridor(scene.index))
     record_miniworld(tmp_path, RecordRequest(scenes=2, episodes=1, seed=3), SIM, quiet=True)
     assert "2 of 2 drives arrived" in capsys.readouterr().out
     dataset = load_dataset("arrays")
@@ -51,7 +51,7 @@ def test_drives_that_arrive_become_episodes_with_the_poses_of_the_robots_camera(
 
 
 def test_a_source_without_a_single_drive_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(recording, "make_miniworld", lambda seed, index, *_: Corridor(index))
+    monkeypatch.setattr(recording, "open_world", lambda scene, _: Corridor(scene.index))
     monkeypatch.setattr(recording, "run_episodes", lambda *_: [type("Stuck", (), {"success": False})()])
     with pytest.raises(ConfigError, match="no drive arrived of 1 x 1"):
         record_miniworld(tmp_path, RecordRequest(scenes=1, episodes=1, seed=3), SIM, quiet=True)
