@@ -4,14 +4,13 @@ from pathlib import Path
 
 import typer
 
+from pipelines.evaluating.nav.config import AGENT
 from wsm_data.errors import ConfigError
 from wsm_data.planners.http.goal_client import GoalClient
 from wsm_data.planners.http.server import PlannerServer, ServerConfig
 from wsm_data.planners.http.service import GOAL_FRAMES, PlannerService, require_servable
 from wsm_data.planners.planner import Planner
 from wsm_data.planners.registry import PlannerConfig, make_planner
-
-AGENT = "agent"
 
 
 def served_planner(name: str, model: Path | None, codec_weights: str, client: GoalClient) -> Planner:
