@@ -17,10 +17,10 @@ def eval_slam(
         Path | None,
         typer.Option("--estimates", help="Folder of another system's estimates: KEY/ with a TUM and a PLY file each."),
     ] = None,
-    split: Annotated[str, typer.Option("--split", help="Split of the clips.")] = "test",
+    split: Annotated[str, typer.Option("--split", help="Split of the clips; '': all.")] = "test",
     limit: Annotated[int, typer.Option("--limit", min=0, help="At most this many clips; 0: all.")] = 0,
     weights: Annotated[str, typer.Option("--weights", help="Folder of the codec's weights, where it has any.")] = "",
-    seed: Annotated[int, typer.Option("--seed", help="Of the intervals.")] = 0,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Of the intervals.")] = 0,
     quiet: Quiet = False,
 ) -> None:
     """Evaluate one system."""

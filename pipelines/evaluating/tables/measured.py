@@ -1,7 +1,7 @@
 """Rows of a table from the summaries of evaluations."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -39,7 +39,7 @@ def measured_row(word: str, table: PaperTable) -> TableRow:
         system=label or str(summary.get("planner") or Path(str(summary["system"])).name),
         source="measured",
         data=_data(summary),
-        inputs=", ".join(one for one in summary.get("inputs", ["rgb"]) if one != "goal") or "none",
+        inputs=_inputs(summary.get("inputs")),
         goal=summary.get("goal", UNKNOWN),
         controller_pose=summary.get("controller_pose", UNKNOWN),
         protocol=summary.get("protocol", UNKNOWN),
@@ -63,6 +63,10 @@ def _data(summary: Mapping[str, Any]) -> str:
     if "world" in summary:
         return f"{summary['world']}, {summary['episodes']} episodes"
     return f"release {summary['release'][:8]}, {summary['split']}, {summary['sequences']} sequences"
+
+
+def _inputs(names: Sequence[str] | None) -> str:
+    return UNKNOWN if names is None else ", ".join(name for name in names if name != "goal") or "none"
 
 
 def _figure(estimate: Mapping[str, float], factor: float) -> Figure:

@@ -23,7 +23,7 @@ class TableRow:
         system: its name, or the label that was given.
         source: `paper` for figures of the paper, `measured` for those of a summary.
         data: world of episodes, or release and split.
-        inputs: what the system is given beside the goal.
+        inputs: what the system is given beside the goal; `-` where that is not known.
         goal: `fixed`, or `oracle` where it is recomputed from the true pose; `-` where there is none.
         controller_pose: whose poses the controller tracks by; `-` where nothing is driven.
         protocol: endings and success; `-` where nothing is driven.

@@ -21,7 +21,6 @@ from wsm_data.errors import ConfigError
 from wsm_data.files.atomic import write_text
 from wsm_data.files.tables import write_table
 from wsm_data.schema.clip import Clip
-from wsm_data.shards.release_codec import codec_of
 from wsm_data.view.drawing.text_table import aligned
 
 
@@ -32,7 +31,7 @@ class SlamRequest:
     Attributes:
         model: folder of a model; or
         estimates: folder with a folder for each sequence, named by the clip's key.
-        split: split of the clips.
+        split: split of the clips; empty: all.
         limit: at most this many clips; 0: all.
         weights: folder of the codec's weights, where it has any.
         seed: of the intervals.
@@ -50,17 +49,14 @@ def eval_slam(location: str, request: SlamRequest, out: Path, quiet: bool) -> No
     """Evaluate, write summary.json, sequences.parquet and every sequence's TUM and PLY, and print the means.
 
     Raises:
-        ConfigError: not one of model and estimates is named, or the split has no clips.
+        ConfigError: not one of model and estimates is named, or there is no such split.
         DataError: a sequence has no estimate, or an unreadable one.
     """
-    if request.model is not None and request.estimates is not None:
-        raise ConfigError("an evaluation is of one system: name either --model or --estimates")
     release = open_release(location)
-    keys = held_out_keys(release, request.split, request.limit)
-    codec = codec_of(release.manifest, request.weights)
-    estimate = _estimator(release, request)
+    keys = sorted(release.keys(split=request.split))
+    codec, estimate = release.codec(request.weights), _estimator(release, request)
     errors = []
-    for key in tqdm(keys, unit="sequence", disable=quiet):
+    for key in tqdm(keys[: request.limit] if request.limit else keys, unit="sequence", disable=quiet):
         clip = release.read_clip(key)
         estimated, true = estimate(clip), true_reconstruction(clip, codec)
         for name, one in (("estimated", estimated), ("true", true)):
@@ -71,25 +67,12 @@ def eval_slam(location: str, request: SlamRequest, out: Path, quiet: bool) -> No
         "release": release.digest,
         "split": request.split,
         "system": str(request.model or request.estimates),
+        "inputs": ["rgb"] if request.model else None,  # another system may have been given depth
         **summarise(errors, request.seed),
     }
     write_text(out / "summary.json", json.dumps(summary, indent=1) + "\n")
     typer.echo(summary_table(summary))
     typer.echo(f"summary: {out / 'summary.json'}")
-
-
-def held_out_keys(release: Release, split: str, limit: int) -> Sequence[str]:
-    """Keys of a split's clips, sorted.
-
-    Raises:
-        ConfigError: there is none.
-    """
-    pairs = zip(release.index.texts("key"), release.index.texts("split"), strict=True)
-    keys = sorted(key for key, of_split in pairs if of_split == split)
-    if not keys:
-        found = ", ".join(sorted(release.manifest.clips_by_split))
-        raise ConfigError(f"the release {release.manifest.name} must have clips of the split {split!r}, it has {found}")
-    return keys[:limit] if limit else keys
 
 
 def sequence_table(errors: Sequence[SequenceErrors]) -> pa.Table:
@@ -117,11 +100,11 @@ def summary_table(summary: dict[str, object]) -> str:
 
 
 def _estimator(release: Release, request: SlamRequest) -> Callable[[Clip], Reconstruction]:
-    if request.model is not None:
+    if request.model is not None and request.estimates is None:
         from pipelines.evaluating.slam_model import model_estimator  # other systems are evaluated without torch
 
-        return model_estimator(request.model, release, codec_of(release.manifest, request.weights))
-    folder = request.estimates
-    if folder is None:
-        raise ConfigError("an evaluation needs a system: name either --model or --estimates")
-    return lambda clip: read_reconstruction(folder / clip.meta.key)
+        return model_estimator(request.model, release, release.codec(request.weights))
+    if request.estimates is not None and request.model is None:
+        folder = request.estimates
+        return lambda clip: read_reconstruction(folder / clip.meta.key)
+    raise ConfigError("an evaluation is of one system: name either --model or --estimates")

@@ -60,6 +60,7 @@ def test_a_model_is_evaluated_from_its_pictures_alone(evaluated):
     found = summary(evaluated)
     rows = pq.read_table(evaluated / "sequences.parquet").to_pylist()
     assert found["sequences"] == len(rows) > 0
+    assert found["inputs"] == ["rgb"]
     scenes = {row["scene"] for row in rows}
     means = [np.mean([row["ate_rmse_unaligned_m"] for row in rows if row["scene"] == one]) for one in scenes]
     assert found["ate_rmse_unaligned_m"]["value"] == pytest.approx(np.mean(means))  # each scene counts once
@@ -80,6 +81,7 @@ def test_the_truth_itself_has_no_error(release, evaluated, tmp_path):
     moved(evaluated, tmp_path / "estimates", lambda one: one)
     code, text = wsm("eval", "slam", release, "--estimates", tmp_path / "estimates", "--out", tmp_path / "o", "--quiet")
     assert code == 0, text
+    assert summary(tmp_path / "o")["inputs"] is None
     for name in ("ate_rmse_sim3_m", "ate_rmse_unaligned_m", "acc_rmse_m", "comp_mean_m"):
         assert summary(tmp_path / "o")[name]["value"] < 1e-5  # rounding of nine decimals and of float32 points
 
@@ -112,7 +114,15 @@ def test_a_sequence_without_an_estimate_is_refused_by_its_folder(release, tmp_pa
     assert not (tmp_path / "o" / "summary.json").exists()
 
 
-@pytest.mark.parametrize("words", [[], ["--model", "m", "--estimates", "e"], ["--estimates", "e", "--split", "none"]])
+@pytest.mark.parametrize(
+    "words",
+    [
+        [],
+        ["--model", "m", "--estimates", "e"],
+        ["--estimates", "e", "--split", "none"],
+        ["--estimates", "e", "--seed", "-1"],
+    ],
+)
 def test_requests_that_say_too_little_or_too_much_are_refused(release, tmp_path, words):
     code, _ = wsm("eval", "slam", release, *words, "--out", tmp_path / "o")
     assert code == 2

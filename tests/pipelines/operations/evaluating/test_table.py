@@ -25,6 +25,7 @@ SLAM = {
     "release": "0123456789",
     "split": "test",
     "system": "runs/tiny/model",
+    "inputs": None,
     "sequences": 3,
     "ate_rmse_sim3_m": INTERVAL,
     "acc_rmse_m": None,
@@ -86,6 +87,7 @@ def test_what_an_evaluation_could_not_measure_is_left_empty(tmp_path, evaluation
     assert wsm_table("slam", evaluation(SLAM), "--out", tmp_path / "out").exit_code == 0
     row = rows_of(tmp_path / "out" / "slam.csv")[-1]
     assert (row["system"], row["data"]) == ("model", "release 01234567, test, 3 sequences")
+    assert row["inputs"] == "-"  # what another system was given, only who ran it knows
     assert (row["ATE RMSE m"], row["Acc. RMSE m"]) == ("0.5", "")
 
 
