@@ -15,8 +15,8 @@ def clips(
     model: Model,
     release: Release,
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder of evaluation.json and run.json; replaced.")],
-    split: Annotated[str, typer.Option("--split", help="Split of the clips.")] = "test",
-    count: Annotated[int, typer.Option("--clips", min=1, help="At most this many.")] = 16,
+    split: Annotated[str | None, typer.Option("--split", help="Split of the clips; test.")] = None,
+    count: Annotated[int | None, typer.Option("--clips", min=1, help="At most this many; 16.")] = None,
     seed: Annotated[
         int, typer.Option("--seed", min=0, help="Of the order in which clips are taken; 0: that of wsm train.")
     ] = 0,
@@ -30,7 +30,8 @@ def clips(
     from pipelines.operations.models import eval_clips as operation
     from pipelines.operations.models.opened import held_out_config
 
-    config = held_out_config(assignments or [], {"split": split, "clips": count})
+    given = {name: value for name, value in (("split", split), ("clips", count)) if value is not None}
+    config = held_out_config(assignments or [], given)
     operation.eval_clips(
         model, release, out, config, seed=seed, flow_shift=flow_shift, codec_weights=codec_weights, quiet=quiet
     )

@@ -11,6 +11,7 @@ from pipelines.training.config import HeldOutConfig
 from pipelines.training.data import clips_loader
 from pipelines.training.evaluation import evaluate
 from wsm_data.access.release import open_release
+from wsm_data.errors import ConfigError
 from wsm_data.files.atomic import write_text
 
 
@@ -38,9 +39,11 @@ def eval_clips(
         quiet: no progress bar.
 
     Raises:
-        ConfigError: there is no model, release or split, or the model is of other latents.
+        ConfigError: there is no model, release or split, no clip is asked for, or the model is of other latents.
         IntegrityError: the model or the release is damaged.
     """
+    if not config.clips:
+        raise ConfigError("clips must be at least 1, found 0: without a clip there is nothing to measure")
     release = open_release(location)
     opened = open_model(folder, release, codec_weights)
     path = out / "evaluation.json"

@@ -31,6 +31,11 @@ def test_what_was_measured_is_named_beside_the_numbers(wsm, trained, tmp_path):
     assert found["held_out"]["session"]["chunk_size"] == 2
 
 
+def test_a_setting_says_how_many_clips_where_no_option_does(wsm, trained, tmp_path):
+    assert len(measured_keys(wsm, trained, tmp_path, "--set", "clips=1")) == 1
+    assert len(measured_keys(wsm, trained, tmp_path, "--set", "clips=1", "--clips", "2")) == 2
+
+
 def test_the_seed_decides_which_clips_of_the_split_are_taken(wsm, trained, tmp_path):
     of_split = set(open_release(trained.release).keys(split="train"))
     taken = {
@@ -56,6 +61,8 @@ def test_a_model_of_other_latents_is_refused_before_anything_is_written(wsm, tra
         (["--split", "none"], "must have clips of split 'none'"),
         (["--set", "flow_steps=0"], "flow_steps"),
         (["--set", "steps=1"], "steps"),
+        (["--set", "clips=0"], "clips must be at least 1"),
+        (["--set", "split=none"], "must have clips of split 'none'"),
     ],
 )
 def test_a_split_or_setting_that_is_not_there_is_refused(wsm, trained, tmp_path, words, said):
