@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from wsm_model.config import Variant
+from wsm_model.config import Expert, Variant
 from wsm_model.evaluation.held_out import clip_errors
 
 
@@ -21,6 +21,14 @@ def test_a_camera_that_stays_where_it_was_has_the_error_of_zero_motion(still_mod
     for one in clip_errors(still_model, batch, make_settings()):
         assert one.states.ate_rmse_unaligned_m == pytest.approx(one.states.ate_rmse_zero_motion_m, rel=1e-6)
         assert one.states.mean_depth_mse == pytest.approx(1.0, abs=0.2)  # standard normal latents
+
+
+def test_a_model_that_always_says_the_mean_depth_has_the_error_of_the_mean(still_model, batch, make_settings):
+    projection = still_model.expert(Expert.DEPTH).head.projection
+    torch.nn.init.zeros_(projection.weight)
+    torch.nn.init.zeros_(projection.bias)
+    for one in clip_errors(still_model, batch, make_settings()):
+        assert one.states.depth_mse == pytest.approx(one.states.mean_depth_mse)
 
 
 def test_still_frames_that_were_added_do_not_count(still_model, batch, make_settings):
