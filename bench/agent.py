@@ -72,7 +72,7 @@ def make_agent(clock: Clock) -> Agent:
 
 
 def measure(clock: Clock) -> dict[int, dict[str, list[float]]]:
-    """Seconds of the parts of a planning step, by the latents seen; the median of three steps around each is told."""
+    """Seconds of the parts of a planning step, by the latents seen: three steps, the first after that many."""
     agent, camera = make_agent(clock), SimConfig().intrinsics
     agent.reset(camera, 1)
     picture = np.random.default_rng(0).integers(0, 256, (camera.height, camera.width, 3), dtype=np.uint8)

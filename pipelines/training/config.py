@@ -88,10 +88,8 @@ class TrainRunConfig:
     def __post_init__(self) -> None:
         if not self.read.standardise:
             raise ValueError("read.standardise must be true: the model is made for standardised latents")
-        split, of_held_out = (
-            self.held_out.split,
-            [one for one in self.sources if one.release == self.sources[0].release],
-        )
+        split = self.held_out.split
+        of_held_out = [one for one in self.sources if one.release == self.sources[0].release]
         if any(one.split == split or not (one.split or one.selection) for one in of_held_out):
             raise ValueError(
                 f"held_out.split must name clips that are not trained on, but a source trains on the split {split!r} "

@@ -119,9 +119,8 @@ def memory_bytes(
     """
     share = 1 / hardware.gpus
     copied = cost.layer_parameters if is_recomputed else cost.parameters
-    whole = (
-        2 * copied if precision is Precision.BFLOAT16 else 0
-    )  # autocast's copies live as long as a layer's activations
+    # autocast's copies live as long as a layer's activations
+    whole = 2 * copied if precision is Precision.BFLOAT16 else 0
     if hardware.gpus > 1:  # two layers are gathered at a time; the gradients of one are whole, and packed to be summed
         whole += cost.layer_parameters * (2 * 4 + 2 * 4)
     kept = _stream_bytes(config, precision) if is_recomputed else cost.layer.kept_bytes
