@@ -46,17 +46,20 @@ def messages(path: Path, topic: str) -> Iterator[tuple[float, dict[str, Any]]]:
 
 def frames(path: Path) -> Iterator[Frame]:
     """Colour, the depth image and the pose next to it in time; what has none of them within 20 ms is left out."""
-    depths, poses = (list(messages(path, topic)) for topic in (DEPTH, POSE))
+    others = [list(messages(path, topic)) for topic in (DEPTH, POSE)]
+    times_s = [np.array([time_s for time_s, _ in those]) for those in others]
     for stamp, image in messages(path, COLOUR):
-        pair = [near(stamp, those) for those in (depths, poses)]
+        pair = [near(stamp, at, those) for at, those in zip(times_s, others, strict=True)]
         if None not in pair:
             yield colour(image), metres(pair[0]), transform(pair[1])
 
 
-def near(stamp: float, those: list[tuple[float, dict[str, Any]]]) -> dict[str, Any] | None:
-    """The message nearest in time."""
-    index = int(nearest_stamps(np.array([stamp]), np.array([time for time, _ in those]))[0])
-    return those[index][1] if abs(those[index][0] - stamp) <= MAX_LAG_S else None
+def near(stamp: float, times_s: np.ndarray, those: list[tuple[float, dict[str, Any]]]) -> dict[str, Any] | None:
+    """The message nearest in time; None where the topic has none within 20 ms."""
+    if not those:
+        return None
+    index = int(nearest_stamps(np.array([stamp]), times_s)[0])
+    return those[index][1] if abs(times_s[index] - stamp) <= MAX_LAG_S else None
 
 
 def colour(image: dict[str, Any]) -> np.ndarray:
