@@ -83,13 +83,14 @@ def audit_latents(audited: AuditedClip) -> Verdict:
     videos = read_videos(record, audited.frames, audited.dataset, config)
     limit = TOLERANCE[audited.codec.describe().dtype]
     pairs = _pairs(audited.clip, videos)
-    errors = {kind: difference(stored, audited.codec.encode(video)) for kind, (stored, video) in pairs.items()}
+    fresh = {kind: audited.codec.encode(video) for kind, (_, video) in pairs.items()}
+    errors = {kind: difference(stored, fresh[kind]) for kind, (stored, _) in pairs.items()}
     limits = {f"{kind}_difference": limit for kind in errors}
     measured: dict[str, object] = {f"{kind}_difference": error for kind, error in errors.items()}
     if max(errors.values()) <= limit:
         return Verdict(measured=measured, limits=limits)
     worst = max(errors, key=lambda kind: errors[kind])
-    reason, what, left = _explained(audited, worst, *pairs[worst])
+    reason, what, left = _explained(audited, worst, *pairs[worst], fresh[worst])
     found = ", ".join(f"{error:.2g} of {kind}" for kind, error in errors.items())
     message = (
         f"{meta.id.text}: latents must differ by {limit:.0e} at most from those of the source, found {found}; {what}"
@@ -121,14 +122,17 @@ def _pairs(clip: Clip, videos: ClipVideos) -> dict[str, tuple[np.ndarray, Float3
     return pairs
 
 
-def _explained(audited: AuditedClip, kind: str, stored: np.ndarray, video: Float32Array) -> tuple[Reason, str, float]:
-    """The change that explains the latents of a kind best, in words, and the difference that it leaves."""
-    plain = difference(stored, audited.codec.encode(video))
+def _explained(
+    audited: AuditedClip, kind: str, stored: np.ndarray, video: Float32Array, fresh: Float32Array
+) -> tuple[Reason, str, float]:
+    """The change that explains the latents of a kind best, in words, and the difference that it leaves.
+
+    `fresh` are the latents of the video as it is.
+    """
+    plain = difference(stored, fresh)
     changes = {**_starts(video), **(_resizes(audited, video) if kind == "rgb" else {})}
     errors = {name: difference(stored, audited.codec.encode(changed())) for name, changed in changes.items()}
-    errors[(Reason.LATENT_DTYPE_CHANGED, "they were rounded to bfloat16")] = difference(
-        stored, _bfloat16(audited.codec.encode(video))
-    )
+    errors[Reason.LATENT_DTYPE_CHANGED, "they were rounded to bfloat16"] = difference(stored, _bfloat16(fresh))
     best = min(errors, key=lambda name: errors[name])
     if errors[best] <= max(TOLERANCE[audited.codec.describe().dtype], plain / BETTER_BY):
         return (*best, errors[best])

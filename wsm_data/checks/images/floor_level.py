@@ -33,8 +33,9 @@ def check_floor_level(drop_m: Float64Array, height_m: Float64Array, slope: Float
         where: what to call the trajectory in the message.
     """
     tells = (slope > 0) & (height_m < FARTHEST_M * slope) & (height_m > 0)
-    measured: dict[str, object] = {"floor_points": int(np.count_nonzero(tells))}
-    if measured["floor_points"] < MIN_POINTS:  # type: ignore[operator]
+    count = int(np.count_nonzero(tells))
+    measured: dict[str, object] = {"floor_points": count}
+    if count < MIN_POINTS:
         return Verdict(measured=measured)
     ratio = np.sort(drop_m[tells] / height_m[tells])
     support = (np.searchsorted(ratio, _RATIOS + NEAR) - np.searchsorted(ratio, _RATIOS - NEAR)) / len(ratio)
