@@ -6,6 +6,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from wsm_data.errors import DataError, Reason
+from wsm_data.readers.lerobot import scan
 from wsm_data.readers.lerobot.reader import LEROBOT
 from wsm_data.readers.lerobot.scan import episode_number, scan_episode, video_features
 
@@ -45,3 +46,15 @@ def test_a_video_that_is_missing_is_a_refusal_of_its_episode(lerobot_root, datas
     with pytest.raises(DataError) as caught:
         scan_episode(root, containers[0], dataset, 3)
     assert caught.value.reason is Reason.FILE_UNREADABLE
+
+
+def test_the_table_of_episodes_is_read_once_and_again_when_it_was_touched(lerobot_root, dataset, tmp_path, monkeypatch):
+    root = shutil.copytree(lerobot_root, tmp_path / "drift")
+    containers, read, places = LEROBOT.find_containers(root, dataset), [], scan.read_places
+    monkeypatch.setattr(scan, "read_places", lambda *args: read.append(1) or places(*args))
+    for container in containers:
+        scan_episode(root, container, dataset, 3)
+    assert len(read) == 1
+    (root / "meta" / "notes.txt").write_text("touched")
+    scan_episode(root, containers[0], dataset, 3)
+    assert len(read) == 2
