@@ -85,9 +85,11 @@ def map_of(episode: Episode) -> SceneMap:
     return build_scene_map(voxels, floor_levels([episode.record.floor_z_m]), DATASET.robot, 2.0)
 
 
-def planted(kinds: dict[str, Planter], episodes: Sequence[Episode]) -> dict[str, list[list[str]]]:
+def planted(kinds: dict[str, Planter], episodes: Sequence[Episode], only: str) -> dict[str, list[list[str]]]:
     found: dict[str, list[list[str]]] = {}
     for number, (kind, plant) in enumerate(kinds.items()):
+        if only not in kind:
+            continue
         found[kind] = []
         for trial in range(TRIALS):
             one, other = (
@@ -108,7 +110,9 @@ def write_sources(folder: Path, config: SynthConfig) -> Path:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--sound", type=int, default=200, help="sound trajectories to check")
+    parser.add_argument(
+        "--sound", type=int, default=200, help="sound trajectories to check beside those that faults are planted in"
+    )
     parser.add_argument(
         "--source", type=Path, help="folder with planted/ and sound/, which are generated where missing"
     )
@@ -118,13 +122,13 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as temporary:
         folder = args.source or Path(temporary)
         episodes = load_episodes(write_sources(folder / "planted", PLANTED_IN))
-        chosen = [{k: v for k, v in kinds.items() if args.only in k} for kinds in (FAULTS, HARMLESS)]
-        faults, harmless = (planted(kinds, episodes) for kinds in chosen)
+        faults, harmless = (planted(kinds, episodes, args.only) for kinds in (FAULTS, HARMLESS))
         if args.only:
             return
-        sound = write_sources(folder / "sound", replace(SOUND, scenes=max(1, args.sound // SOUND.trajectories)))
-        refused = [reasons for one in load_episodes(sound) if (reasons := found_in(one))]
-    report(faults, harmless, args.sound, refused)
+        scenes = -(-args.sound // SOUND.trajectories)
+        sound = episodes + load_episodes(write_sources(folder / "sound", replace(SOUND, scenes=scenes)))
+        refused = [reasons for one in sound if (reasons := found_in(one))]
+    report(faults, harmless, len(sound), refused)
 
 
 def report(
