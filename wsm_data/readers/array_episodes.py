@@ -103,9 +103,9 @@ def _read_recording(
 
 
 def _name(camera: object) -> str:
-    """The name of a camera, which becomes part of a group's."""
-    if not isinstance(camera, str) or not camera.isprintable() or "/" in camera:
-        raise ValueError(f"camera must be a name without `/` and control characters, found {camera!r}")
+    """The name of a camera, which becomes the last word of a group's."""
+    if not isinstance(camera, str) or not camera or not camera.isprintable() or "/" in camera or "_" in camera:
+        raise ValueError(f"camera must be a name without `/`, `_` and control characters, found {camera!r}")
     return camera
 
 

@@ -64,8 +64,8 @@ def write_episode(
             does not fit the images, a name that is none, or no frame at all.
     """
     EpisodeId(f"arrays_{camera}", scene, episode)  # refuses names that are paths
-    if "_" in camera:
-        raise ValueError(f"the name of a camera must not hold '_', found {camera!r}")
+    if "_" in camera or not camera:
+        raise ValueError(f"the name of a camera must not be empty or hold '_', found {camera!r}")
     if goal_world_m is not None:
         require_finite("goal_world_m", np.array(goal_world_m, np.float64))
     said = {"camera": camera, "floor_z_m": floor_z_m, "goal_world_m": goal_world_m}

@@ -120,6 +120,8 @@ def test_a_damaged_episode_is_refused_and_the_other_goes_on(tmp_path, dataset, d
         ({"camera": ["cam"]}, Reason.SEQUENCE_UNREADABLE),
         ({"camera": "\x1b[2J"}, Reason.SEQUENCE_UNREADABLE),
         ({"camera": "a/b"}, Reason.SEQUENCE_UNREADABLE),
+        ({"camera": "my_cam"}, Reason.SEQUENCE_UNREADABLE),
+        ({"camera": ""}, Reason.SEQUENCE_UNREADABLE),
         ({"T_world_camera": [[float("nan")] * 16] * 6}, Reason.POSE_NOT_FINITE),
     ],
 )

@@ -89,7 +89,10 @@ def test_a_camera_that_is_none_is_refused(tmp_path, matrix, said):
         write_episode(tmp_path, "kitchen", "one", [frame()], K=matrix)
 
 
-@pytest.mark.parametrize(("scene", "camera", "said"), [("../x", "cam", "not a path"), ("s", "my_cam", "must not hold")])
+@pytest.mark.parametrize(
+    ("scene", "camera", "said"),
+    [("../x", "cam", "not a path"), ("s", "my_cam", "or hold"), ("s", "", "must not be empty")],
+)
 def test_names_that_cannot_be_are_refused(tmp_path, scene, camera, said):
     with pytest.raises(ValueError, match=said):
         write_episode(tmp_path, scene, "one", [frame()], K=K, camera=camera)
