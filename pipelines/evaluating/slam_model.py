@@ -8,7 +8,9 @@ import torch
 
 from pipelines.evaluating.slam_sequence import Reconstruction, reconstruction
 from wsm_data.access.release import Release
+from wsm_data.clips.decoded import DecodedVideo
 from wsm_data.codecs.base import VideoCodec
+from wsm_data.codecs.depth import depth_m_from_latent_video
 from wsm_data.errors import ConfigError
 from wsm_data.loaders.batches.standardise import standardisations
 from wsm_data.schema.clip import Clip
@@ -20,8 +22,10 @@ from wsm_model.losses.pose import raw_frame_poses
 from wsm_model.model_file import load_model
 
 
-def model_estimator(folder: Path, release: Release, codec: VideoCodec) -> Callable[[Clip], Reconstruction]:
-    """What estimates poses and depth of a clip from its RGB latents alone.
+def model_estimator(
+    folder: Path, release: Release, codec: VideoCodec
+) -> Callable[[Clip, DecodedVideo], Reconstruction]:
+    """What estimates poses and depth of a clip from its RGB latents alone; points have its decoded colours.
 
     Raises:
         ConfigError: there is no model, it was trained on other latents, or it is one without SLAM.
@@ -35,12 +39,12 @@ def model_estimator(folder: Path, release: Release, codec: VideoCodec) -> Callab
     model.to(device)
     standardise = standardisations(release.manifest, depth=False)["rgb"]
 
-    def estimate(clip: Clip) -> Reconstruction:
+    def estimate(clip: Clip, decoded: DecodedVideo) -> Reconstruction:
         stored = torch.from_numpy(clip.rgb_latent.astype(np.float32)).to(device)
         streamed = stream_clip(model, standardise.whole(stored, torch.float32), SessionConfig())
-        latents = standard.raw_depth(streamed.depth.float().cpu().numpy())
-        return reconstruction(
-            clip, codec, latents, raw_frame_poses(streamed.poses.float().cpu()).double().numpy(), None
-        )
+        video = codec.decode(standard.raw_depth(streamed.depth.float().cpu().numpy()))
+        depth_m = depth_m_from_latent_video(video[list(decoded.frames)], clip.meta.depth_range)
+        poses = raw_frame_poses(streamed.poses.float().cpu()).double().numpy()
+        return reconstruction(clip, decoded, depth_m, poses, None)
 
     return estimate

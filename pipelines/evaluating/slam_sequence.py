@@ -5,8 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wsm_data.codecs.base import VideoCodec
-from wsm_data.codecs.depth import depth_m_from_latent_video
+from wsm_data.clips.decoded import DecodedVideo, valid_cells
 from wsm_data.codecs.ply import ply_bytes
 from wsm_data.errors import ConfigError, DataError, Reason
 from wsm_data.files.atomic import write_bytes
@@ -41,51 +40,58 @@ class Reconstruction:
     cloud: PointCloud
 
 
-def true_reconstruction(clip: Clip, codec: VideoCodec) -> Reconstruction:
+def shown_frames(clip: Clip) -> range:
+    """The last frame of each latent; still frames that were added to the clip are left out."""
+    return range(0, clip.meta.frames - clip.meta.padded_frames, TEMPORAL_RATIO)
+
+
+def true_reconstruction(clip: Clip, decoded: DecodedVideo) -> Reconstruction:
     """The truth of a clip in the first camera's frame: its recorded frames, and the points of its measured depth.
 
     Depth is what the stored latents decode to, where every pixel of a latent's cell was measured.
 
+    Args:
+        clip: the clip.
+        decoded: its `shown_frames`.
+
     Raises:
         ConfigError: the clip has no depth.
     """
-    if clip.depth_latent is None or clip.depth_valid is None:
+    if not clip.has_depth:
         raise ConfigError(
             f"sequences must have depth to hold a reconstruction against, and {clip.meta.key} has none: its source has "
             "none; evaluate a release with depth"
         )
-    measured = clip.depth_valid == np.iinfo(np.uint8).max
-    ratio = codec.describe().spatial_ratio
+    measured = valid_cells(clip, decoded.frames) == np.iinfo(np.uint8).max
+    ratio = decoded.rgb.shape[1] // measured.shape[1]
     seen = measured.repeat(ratio, axis=1).repeat(ratio, axis=2)
-    return reconstruction(clip, codec, clip.depth_latent.astype(np.float32), clip.poses.astype(np.float64), seen)
+    return reconstruction(clip, decoded, decoded.depth_m, clip.poses.astype(np.float64), seen)
 
 
 def reconstruction(
-    clip: Clip, codec: VideoCodec, depth_latents: Float32Array, poses: Float64Array, seen: BoolArray | None
+    clip: Clip, decoded: DecodedVideo, depth_m: Float32Array, poses: Float64Array, seen: BoolArray | None
 ) -> Reconstruction:
-    """Poses [T, 7] and raw depth latents [F, C, h, w] of a clip's frames as a trajectory and points.
+    """Poses of a clip's frames, and depth of some of them, as a trajectory and points.
 
-    Each latent gives the points of its last frame, one for every fourth pixel either way; still frames that were added
-    to the clip give none.
+    One pixel in four either way gives a point.
 
     Args:
-        clip: gives colours and the camera.
-        codec: of the latents.
-        depth_latents: of the clip, estimated or true.
-        poses: of its frames, likewise.
-        seen: pixels [F, H, W] that have a depth; None for all.
+        clip: gives the camera.
+        decoded: gives colours, of its `shown_frames`.
+        depth_m: of these frames, estimated or true; [N, H, W], m.
+        poses: of all frames, likewise; [T, 7].
+        seen: pixels [N, H, W] that have a depth; None for all.
     """
     recorded = clip.meta.frames - clip.meta.padded_frames
     T_camera0_camera = transforms_from_vectors(poses[:recorded])
-    depth_m = depth_m_from_latent_video(codec.decode(depth_latents), clip.meta.depth_range)
-    rgb = np.round((np.clip(codec.decode(clip.rgb_latent.astype(np.float32)), -1, 1) + 1) * 127.5).astype(np.uint8)
     rays = pixel_rays(clip.intrinsics)
-    parts = []
-    for latent, frame in enumerate(range(0, recorded, TEMPORAL_RATIO)):
-        kept = depth_m[frame] <= MAX_DEPTH_M
-        if seen is not None:
-            kept &= seen[latent]
-        parts.append(_points(depth_m[frame], rgb[frame], kept, rays, T_camera0_camera[frame]))
+    kept = depth_m <= MAX_DEPTH_M
+    if seen is not None:
+        kept &= seen
+    parts = [
+        _points(depth_m[number], decoded.rgb[number], kept[number], rays, T_camera0_camera[frame])
+        for number, frame in enumerate(decoded.frames)
+    ]
     points, colours = (np.concatenate(some) for some in zip(*parts, strict=True))
     return Reconstruction(
         trajectory=StampedTrajectory(stamps_s=np.arange(recorded, dtype=np.float64), T_world_camera=T_camera0_camera),

@@ -13,10 +13,12 @@ from pipelines.evaluating.slam_errors import METRICS, SequenceErrors, sequence_e
 from pipelines.evaluating.slam_sequence import (
     Reconstruction,
     read_reconstruction,
+    shown_frames,
     true_reconstruction,
     write_reconstruction,
 )
 from wsm_data.access.release import Release, open_release
+from wsm_data.clips.decoded import DecodedVideo
 from wsm_data.errors import ConfigError
 from wsm_data.files.atomic import write_text
 from wsm_data.files.tables import write_table
@@ -54,11 +56,12 @@ def eval_slam(location: str, request: SlamRequest, out: Path, quiet: bool) -> No
     """
     release = open_release(location)
     keys = sorted(release.keys(split=request.split))
-    codec, estimate = release.codec(request.weights), _estimator(release, request)
+    estimate = _estimator(release, request)
     errors = []
     for key in tqdm(keys[: request.limit] if request.limit else keys, unit="sequence", disable=quiet):
         clip = release.read_clip(key)
-        estimated, true = estimate(clip), true_reconstruction(clip, codec)
+        decoded = release.decode(clip, frames=shown_frames(clip), weights=request.weights)
+        estimated, true = estimate(clip, decoded), true_reconstruction(clip, decoded)
         for name, one in (("estimated", estimated), ("true", true)):
             write_reconstruction(out / "sequences" / key / name, one)
         errors.append(sequence_errors(key, clip.meta.id.physical_scene, estimated, true))
@@ -99,12 +102,12 @@ def summary_table(summary: dict[str, object]) -> str:
     return aligned(rows) + f"\nrefused: {summary['refused'] or 'none'}"
 
 
-def _estimator(release: Release, request: SlamRequest) -> Callable[[Clip], Reconstruction]:
+def _estimator(release: Release, request: SlamRequest) -> Callable[[Clip, DecodedVideo], Reconstruction]:
     if request.model is not None and request.estimates is None:
         from pipelines.evaluating.slam_model import model_estimator  # other systems are evaluated without torch
 
         return model_estimator(request.model, release, release.codec(request.weights))
     if request.estimates is not None and request.model is None:
         folder = request.estimates
-        return lambda clip: read_reconstruction(folder / clip.meta.key)
+        return lambda clip, _: read_reconstruction(folder / clip.meta.key)
     raise ConfigError("an evaluation is of one system: name either --model or --estimates")
