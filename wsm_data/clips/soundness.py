@@ -97,10 +97,9 @@ def check_container(container: Container, checks: SourceChecks) -> Iterator[Chec
         return
     try:
         scene_map = _scene_map(scan, kept, checks.dataset)
+        yield from _check_images(container, kept, scene_map, checks)
     except DataError as error:
         yield _unreadable(container.id, container.id, error)
-        return
-    yield from _check_images(container, kept, scene_map, checks)
 
 
 def _scene_map(scan: ContainerScan, records: Sequence[EpisodeRecord], dataset: DatasetManifest) -> SceneMap:

@@ -1,13 +1,16 @@
 """All checks on a container of generated homes, against what a run of the stages decides."""
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from wsm_data.clips import soundness
 from wsm_data.clips.config import ClipConfig
 from wsm_data.clips.soundness import SourceChecks, check_container
 from wsm_data.errors import Reason
+from wsm_data.readers.guard import guarded
 from wsm_data.readers.manifest import load_dataset
 from wsm_data.readers.registry import source_reader
 
@@ -66,3 +69,13 @@ def test_a_container_that_cannot_be_read_is_one_finding(tmp_path):
     (tmp_path / "group_d435i" / "home.tar.gz").write_bytes(b"version https://git-lfs.github.com/spec/v1\n")
     (unit,) = checked(tmp_path).values()
     assert [finding.reason for finding in unit.findings] == [Reason.ARCHIVE_POINTER_FILE]
+
+
+def test_a_container_that_a_parser_fails_on_in_the_second_pass_is_one_finding(source, monkeypatch):
+    def fails(*_):
+        raise MemoryError
+
+    failing = guarded(replace(source_reader(load_dataset("synthetic")), iter_frames=fails))
+    monkeypatch.setattr(soundness, "source_reader", lambda _: failing)
+    (unit,) = checked(source).values()
+    assert [finding.reason for finding in unit.findings] == [Reason.CONTAINER_UNPARSABLE]
