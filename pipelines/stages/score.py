@@ -17,13 +17,14 @@ from wsm_data.codecs.dct import DctCodec
 from wsm_data.curation.path_outline import Outlines
 from wsm_data.curation.rollouts import ROLLOUT_SCORES, read_rollouts, rollout_scores
 from wsm_data.curation.score_clip import CLIP_SCORES, ClipScores, score_clip
-from wsm_data.curation.scores_table import SCORES_VERSION, ScoreTable, read_paths, read_scores, write_scores
+from wsm_data.curation.scores_table import ScoreTable, read_paths, read_scores, write_scores
 from wsm_data.errors import IntegrityError
 from wsm_data.files.digest import digest_json, sha256_file
 from wsm_data.files.stores import open_store
 from wsm_data.files.typed_toml import INPUT, SELECTION
 from wsm_data.shards.manifest import release_digest
 from wsm_data.shards.names import SCORES_NAME
+from wsm_data.shards.scores_statement import SCORES_VERSION
 
 _PARTS = "parts"
 

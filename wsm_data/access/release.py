@@ -120,15 +120,16 @@ class Release:
         """The index, one row a clip, and behind it the scores where the release has any, by their names.
 
         Raises:
+            ConfigError: the scores are of another release.
             IntegrityError: a table is damaged, or the scores are of other clips.
         """
-        return release_table(self.store, self.index)
+        return release_table(self.store, self.index, self.digest)
 
     def to_pandas(self) -> "pd.DataFrame":
         """As `to_arrow`, with the key as index.
 
         Raises:
-            ConfigError: pandas is not installed.
+            ConfigError: pandas is not installed, or as `to_arrow`.
             IntegrityError: as `to_arrow`.
         """
         try:

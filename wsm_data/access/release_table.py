@@ -4,20 +4,27 @@ from functools import partial
 
 import pyarrow as pa
 
-from wsm_data.errors import IntegrityError
+from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.files.stores import Store
 from wsm_data.files.tables import opened_table
 from wsm_data.shards.index.row import REPEATED_COLUMNS, SCHEMA
 from wsm_data.shards.index.table import IndexTable
 from wsm_data.shards.names import SCORES_NAME
+from wsm_data.shards.scores_statement import read_scores_statement
 
 _REMEDY = "run `wsm score` again"
 
 
-def release_table(store: Store, index: IndexTable) -> pa.Table:
+def release_table(store: Store, index: IndexTable, digest: str) -> pa.Table:
     """All columns of the index, with plain texts, and behind them the scores where the release has any.
 
+    Args:
+        store: where the release is.
+        index: its index.
+        digest: its digest, which scores must name.
+
     Raises:
+        ConfigError: the scores are of another release.
         IntegrityError: a table is damaged, or the scores are of other clips.
     """
     table = index.columns(SCHEMA.names).replace_schema_metadata()
@@ -29,7 +36,10 @@ def release_table(store: Store, index: IndexTable) -> pa.Table:
     with opened_table(
         partial(pa.BufferReader, store.read(SCORES_NAME)), f"{where} must be a table of scores", _REMEDY
     ) as file:
+        found = read_scores_statement(file.schema_arrow)["release_digest"]
         scores = file.read()
+    if found != digest:
+        raise ConfigError(f"{where} must hold the scores of this release, {digest}, found those of {found}; {_REMEDY}")
     if not scores["key"].combine_chunks().equals(table["key"].combine_chunks()):
         raise IntegrityError(f"{where} must have a row for each clip, in the order of the index; {_REMEDY}")
     for field in scores.schema:

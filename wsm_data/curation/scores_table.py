@@ -23,15 +23,13 @@ from numpy.typing import NDArray
 from wsm_data.curation.path_outline import PATH_POINTS, Outlines
 from wsm_data.errors import ConfigError
 from wsm_data.files.json_values import from_json, to_json
-from wsm_data.files.sealed import sealed, unsealed
-from wsm_data.files.tables import opened_table, read_statement, require_columns, with_statement, write_table
+from wsm_data.files.tables import opened_table, require_columns, write_table
 from wsm_data.files.typed_toml import did_you_mean
 from wsm_data.schema.arrays import Float32Array, Float64Array, require_array, require_finite
+from wsm_data.shards.scores_statement import read_scores_statement, with_scores_statement
 
-SCORES_VERSION = 3
 KEY_COLUMN, PATH_COLUMN, FLOOR_COLUMN = "key", "path_xy_m", "floor_z_m"
 
-_STATEMENT = "wsm.scores"
 _POINT_DTYPE = np.dtype("<f4")
 _PATH_BYTES = PATH_POINTS * 2 * _POINT_DTYPE.itemsize
 """An outline is stored as one value of so many bytes: a list of numbers takes several times as long to read."""
@@ -234,11 +232,9 @@ def require_sound_values(table: ScoreTable, where: str) -> None:
 
 
 def _schema(release_digest: str, scorers: Sequence[ScorerInfo]) -> pa.Schema:
-    stated = {"version": SCORES_VERSION, "release_digest": release_digest, "scorers": to_json(scorers)}
-    statement = sealed(stated)  # parquet has checksums for its pages alone
     columns = [(KEY_COLUMN, pa.string()), (PATH_COLUMN, pa.binary(_PATH_BYTES)), (FLOOR_COLUMN, pa.float32())]
     columns += [(one.name, pa.float64()) for one in scorers]
-    return with_statement(pa.schema(columns), _STATEMENT, statement)
+    return with_scores_statement(pa.schema(columns), release_digest, to_json(scorers))
 
 
 def _stored_outlines(outlines: Outlines, clips: int) -> list[pa.Array]:
@@ -277,7 +273,7 @@ def _open(where: str) -> Iterator[pq.ParquetFile]:
 
 
 def _parse_metadata(schema: pa.Schema) -> tuple[str, tuple[ScorerInfo, ...]]:
-    statement = unsealed(read_statement(schema, _STATEMENT, SCORES_VERSION))
+    statement = read_scores_statement(schema)
     scorers = tuple(from_json(ScorerInfo, one) for one in statement["scorers"])
     require_columns(schema, _schema(statement["release_digest"], scorers))
     return str(statement["release_digest"]), scorers
