@@ -69,9 +69,9 @@ def test_the_clip_has_no_depth_and_a_map_of_what_the_footprint_swept(release):
     assert clip.expert_distance[-1] == 0
 
 
-def test_verify_inspect_and_score_say_that_there_is_no_depth(release):
+def test_verify_inspect_and_score_say_that_there_is_no_depth(release, tmp_path):
     assert "is whole" in invoke("verify", release)
-    assert "the clip has no depth" in invoke("inspect", release, RGB_ONLY)
+    assert "the clip has no depth" in invoke("inspect", release, RGB_ONLY, "--out", tmp_path / "clip.png")
     scores = pq.read_table(release / "scores.parquet", columns=["key", "depth_invalid_share"]).to_pydict()
     shares = dict(zip(scores["key"], scores["depth_invalid_share"], strict=True))
     assert shares[RGB_ONLY] is None
