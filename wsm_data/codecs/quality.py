@@ -21,7 +21,7 @@ def psnr_db(reference: Float32Array, decoded: Float32Array) -> float:
         ValueError: the shapes differ.
     """
     squared_error_sum, values = _squared_errors(reference, decoded)
-    return _psnr_db(squared_error_sum, values)
+    return psnr_of_sum_db(squared_error_sum, values)
 
 
 def _squared_errors(reference: Float32Array, decoded: Float32Array) -> tuple[float, int]:
@@ -31,7 +31,12 @@ def _squared_errors(reference: Float32Array, decoded: Float32Array) -> tuple[flo
     return sum(float(np.square(a.astype(np.float64) - b).sum()) for a, b in frames), reference.size
 
 
-def _psnr_db(squared_error_sum: float, values: int) -> float:
+def psnr_of_sum_db(squared_error_sum: float, values: int) -> float:
+    """Peak signal-to-noise ratio of so many values in [-1, 1], dB; infinite where the sum of squared errors is 0.
+
+    Raises:
+        ValueError: there is no value.
+    """
     if not values:
         raise ValueError("PSNR needs at least one value, found none")
     if squared_error_sum == 0:
@@ -150,7 +155,7 @@ class CodecQuality:
     @property
     def psnr_db(self) -> float:
         """PSNR of the pooled squared error of all clips, dB."""
-        return _psnr_db(self.squared_error_sum, self.values)
+        return psnr_of_sum_db(self.squared_error_sum, self.values)
 
     def merge(self, other: "CodecQuality") -> "CodecQuality":
         """Quality on the clips of both.

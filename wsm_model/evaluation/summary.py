@@ -5,9 +5,8 @@ from itertools import zip_longest
 
 import numpy as np
 
+from wsm_data.codecs.quality import psnr_of_sum_db
 from wsm_model.evaluation.held_out import ClipErrors, DreamErrors, PictureErrors, StateErrors
-
-_SPAN = 2.0  # of colours in [-1, 1]
 
 
 def summarise(errors: Sequence[ClipErrors]) -> dict[str, object]:
@@ -55,4 +54,4 @@ def _mean(values: Iterable[float | None]) -> float | None:
 
 
 def _psnr_db(mse: float | None) -> float | None:
-    return float(10 * np.log10(_SPAN**2 / mse)) if mse else None
+    return psnr_of_sum_db(mse, 1) if mse else None
