@@ -6,6 +6,7 @@ from importlib.resources import files
 import pytest
 import torch
 from torch.autograd.graph import saved_tensors_hooks
+from torch.utils.flop_counter import sdpa_backward_flop_count, sdpa_flop_count
 
 from wsm_data.files.typed_toml import build_config
 from wsm_data.schema.sequence import frame_table
@@ -60,6 +61,36 @@ def test_operations_of_a_layer_are_two_for_each_weight_and_token():
 def test_pairs_are_those_of_the_dense_mask(config, make_spans):
     pairs = [int(dense_mask(config, frame_table(make_spans([9], [size]), 1, 9)).sum()) for size in (1, 2, 3, 4)]
     assert attended_pairs(config, 9) == sum(pairs) / 4
+
+
+def test_attention_takes_what_torch_counts_for_the_pairs_forward_and_backward(config):
+    """Beyond three times the products of a pass; recomputing repeats the layers' products and the forward attention."""
+    cost, pairs = model_cost(config, Precision.FLOAT32), int(attended_pairs(config, 9))
+    queries, keys = (1, config.heads, pairs, config.head_width), (1, config.heads, 1, config.head_width)
+    forward = config.layers * sdpa_flop_count(queries, keys, keys)
+    backward = config.layers * sdpa_backward_flop_count(queries, queries, keys, keys)
+    once, again = (step_flop(config, cost, {9: 1.0}, is_recomputed=one) for one in (False, True))
+    products = 9 * (config.layers * cost.layer.flop + cost.ends.flop)
+    assert pairs == attended_pairs(config, 9)
+    assert once - 3 * products == pytest.approx(forward + backward)
+    assert again - once == pytest.approx(9 * config.layers * cost.layer.flop + forward)
+
+
+@pytest.mark.parametrize(
+    ("precision", "gpus", "is_recomputed", "of_a_layer"),
+    [
+        (Precision.FLOAT32, 1, False, 0),
+        (Precision.BFLOAT16, 1, True, 2),  # the rounded weights of the layer at work
+        (Precision.FLOAT32, 4, True, 16),  # two layers gathered, gradients of one whole and packed: four of 4 bytes
+        (Precision.BFLOAT16, 4, True, 18),
+    ],
+)
+def test_layers_at_work_hold_rounded_copies_and_what_is_gathered(config, precision, gpus, is_recomputed, of_a_layer):
+    cost = model_cost(config, precision)
+    hardware = HardwareConfig(gpus=gpus, memory_gib=8.0)
+    memory = memory_bytes(config, cost, hardware, precision, latents=10, is_recomputed=is_recomputed)
+    assert memory["weights of layers at work"] == of_a_layer * cost.layer_parameters
+    assert memory["one layer in the backward pass"] == 2 * 10 * cost.layer.kept_bytes  # values and their gradients
 
 
 def test_recomputing_costs_a_forward_pass_and_saves_what_layers_keep(config):
