@@ -39,7 +39,8 @@ _TYPE_NAMES = {str: "text in quotes", int: "a whole number", float: "a number", 
 
 
 MAX_SECTIONS = 16
-"""Sections in one key, far more than any setting has."""
+"""Sections in one key, far more than any setting has. Each is a table within a table, and a line of them would take
+minutes and gigabytes to parse."""
 
 _DEEP_KEY = re.compile(rf"""(?<![\w-])(?:(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){{{MAX_SECTIONS + 1}}}""")
 
@@ -52,9 +53,7 @@ def load_toml(path: Path) -> dict[str, Any]:
     """
     try:
         text = path.read_text(encoding="utf-8")
-        if _DEEP_KEY.search(
-            text
-        ):  # each dot is a table within a table: a line of them would take minutes and gigabytes
+        if _DEEP_KEY.search(text):
             raise ConfigError(f"{path} has a key of more than {MAX_SECTIONS} sections; no setting lies that deep")
         return tomllib.loads(text)
     except FileNotFoundError as error:
