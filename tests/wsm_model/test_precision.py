@@ -51,6 +51,13 @@ def test_a_session_runs_a_model_as_its_matrices_are_stored(both, make_inputs, ma
     assert not torch.equal(*poses)
 
 
+def test_autocast_keeps_no_rounded_copy_of_a_weight():
+    """torch keeps them until the end of the context unless it is told not to: a copy of the whole model."""
+    assert torch.is_autocast_cache_enabled()
+    with autocast(Precision.BFLOAT16, torch.device("cpu")):
+        assert not torch.is_autocast_cache_enabled()
+
+
 def test_what_computes_in_float32_keeps_its_weights_and_the_rest_is_halved():
     """At the paper's size 24.5 GB become 12.4 GB: all but 1 % are matrices that autocast rounds."""
     with torch.device("meta"):
