@@ -9,7 +9,10 @@ from torch import Tensor
 from wsm_model.config import Prediction
 
 LEAST_FLOW_TIME = 0.05
-"""Where x is predicted, v = (x_tau - x) / tau is taken at no smaller tau: errors of x would grow beyond all bounds."""
+"""Where x is predicted, v = (x_tau - x) / tau is taken at no smaller tau: errors of x would grow beyond all bounds.
+
+The bound of the program of arXiv 2511.13720.
+"""
 
 
 def shifted_flow_time(uniform: Tensor, shift: float) -> Tensor:
