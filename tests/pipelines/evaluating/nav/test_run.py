@@ -65,13 +65,14 @@ def test_what_is_done_is_not_done_again_and_more_episodes_go_on(tmp_path, opened
     assert outputs(tmp_path / "out") == outputs(tmp_path / "whole")
 
 
-def test_a_map_that_is_missing_is_drawn_without_driving_again(tmp_path, opened, make_config):
+def test_a_map_that_is_missing_is_drawn_without_driving_again(tmp_path, opened, make_config, monkeypatch):
     evaluate(make_config(), tmp_path, 2)
-    path, record = tmp_path / "maps" / "home_7_0000.png", (tmp_path / "driven.jsonl").read_bytes()
+    path = tmp_path / "maps" / "home_7_0000.png"
     drawn = path.read_bytes()
     path.unlink()
+    monkeypatch.delattr(drive, "run_episodes")
     evaluate(make_config(), tmp_path, 2)
-    assert (path.read_bytes(), (tmp_path / "driven.jsonl").read_bytes()) == (drawn, record)
+    assert path.read_bytes() == drawn
 
 
 def test_an_evaluation_cut_short_before_its_map_leaves_none_that_lacks_a_way(
