@@ -1,6 +1,8 @@
 """wsm eval clips: the numbers of training, without training."""
 
 import json
+import shutil
+from pathlib import Path
 
 import pytest
 
@@ -29,6 +31,16 @@ def test_what_was_measured_is_named_beside_the_numbers(wsm, trained, tmp_path):
     assert found["was_trained_on"] is True
     assert (found["held_out"]["split"], found["held_out"]["clips"]) == ("test", 1)
     assert found["held_out"]["session"]["chunk_size"] == 2
+
+
+def test_a_release_that_the_card_does_not_name_was_not_trained_on(wsm, trained, tmp_path):
+    folder = Path(shutil.copytree(trained.model, tmp_path / "model"))
+    card = json.loads((folder / "model.json").read_text())
+    (folder / "model.json").write_text(json.dumps(card | {"releases": ["0" * 32]}))
+    words = ("--out", tmp_path, *trained.likewise, "--clips", "1", "--quiet")
+    code, text = wsm("eval", "clips", folder, trained.release, *words)
+    assert code == 0, text
+    assert json.loads((tmp_path / "run.json").read_text())["was_trained_on"] is False
 
 
 def test_a_setting_says_how_many_clips_where_no_option_does(wsm, trained, tmp_path):
