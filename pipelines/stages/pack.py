@@ -163,7 +163,7 @@ def _finish(config: PackConfig, context: StageContext, settled: Settled) -> Fini
     shards: list[_Shard] = [unit.payload for unit in _list_units(config)]
     layouts = [shard.layout for shard in shards]
     by_key = {key: outcome for shard in shards for key, outcome in shard.clips.items()}
-    clips = _clips(config)
+    clips = {outcome.unit: outcome for outcome in by_key.values()}
     digests = {name: outcome.facts["source_digest"] for name, outcome in clips.items()}
     account = account_of(config.index, config.encode, read_split(config.split), digests)
     finish_release(
