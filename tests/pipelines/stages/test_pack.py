@@ -282,3 +282,20 @@ def test_partial_is_no_setting(encoded):
     assert encoded.run("pack").ran == ()
     assert files(encoded) == before
     assert not open_release(encoded.release).manifest.partial  # nothing was pending
+
+
+@pytest.mark.parametrize(("suffix", "redone"), [("clip", "*"), ("json", "*"), ("json", MANIFEST)])
+def test_a_clip_that_changed_after_encode_is_refused_and_packed_once_it_is_made_again(encoded, suffix, redone):
+    """Where the manifest alone is written again, sidecars are read for it, and no fragment."""
+    encoded.run("pack")
+    whole = files(encoded)
+    damaged = min((encoded.folder("encode") / "clips").rglob(f"*.{suffix}"))
+    data = damaged.read_bytes()
+    damaged.write_bytes(data[:-8] + bytes([data[-8] ^ 1]) + data[-7:])
+    for output in encoded.release.glob(redone):
+        output.unlink()
+    with pytest.raises(IntegrityError, match=rf"{damaged.name} must hold what `wsm encode` wrote, found other bytes"):
+        encoded.run("pack")
+    encoded.run("encode")
+    encoded.run("pack")
+    assert files(encoded) == whole
