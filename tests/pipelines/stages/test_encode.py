@@ -13,13 +13,13 @@ from box_room import (
 from encode_scenes import DEN, HALL, UNITS, ZED, again, frame
 
 from pipelines.artifacts.episode_table import read_episodes
-from pipelines.artifacts.layout import clips_folder, codec_path
+from pipelines.artifacts.layout import clips_folder, codec_path, map_path, records_path
 from pipelines.stages import encode, index
 from wsm_data.clips.config import ClipConfig
 from wsm_data.codecs.dct import DctCodec
 from wsm_data.codecs.quality import CodecQuality
 from wsm_data.codecs.registry import CodecConfig
-from wsm_data.errors import ConfigError
+from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.files.digest import sha256_file, xxh3_128
 from wsm_data.files.json_values import from_json
 from wsm_data.files.typed_toml import build_config
@@ -205,6 +205,14 @@ def test_of_a_trajectory_that_stands_twice_the_kept_one_is_the_unit(make_pipelin
 def test_it_starts_from_finished_stages(mapped, missing):
     shutil.rmtree(mapped.folder(missing))
     with pytest.raises(ConfigError, match=f"run `wsm {missing}` first"):
+        mapped.run("encode")
+
+
+@pytest.mark.parametrize(("stage", "path_of"), [("index", records_path), ("map", map_path)])
+def test_what_a_stage_before_wrote_is_refused_once_it_changed(mapped, stage, path_of):
+    path = path_of(mapped.folder(stage), HALL)
+    path.write_bytes(path.read_bytes()[::-1])
+    with pytest.raises(IntegrityError, match=rf"{path.name} must hold what `wsm {stage}` wrote, found other bytes"):
         mapped.run("encode")
 
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from box_room import DATASET, MANIFEST_TOML, UPSTAIRS, along_x
 
-from pipelines.artifacts.layout import map_path
+from pipelines.artifacts.layout import map_path, surface_path
 from pipelines.stages.map import WithoutCloud
-from wsm_data.errors import ConfigError
+from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.files.jsonlines import read_lines
 from wsm_data.maps.occupancy import occupancy_for
 from wsm_data.maps.scene_map import load_scene_map, scene_map_digest
@@ -70,6 +70,13 @@ def test_a_changed_convention_is_a_changed_input_of_every_scene(indexed, changed
     indexed.set_manifest(MANIFEST_TOML + "[robot]\nground_clearance_m = 0.1\n")
     indexed.run("index")
     assert changed(before, indexed.inputs("map")) == {key: {"dataset"} for key in (DEN, HALL, ZED)}
+
+
+def test_a_surface_that_changed_since_index_wrote_it_is_refused(indexed):
+    path = surface_path(indexed.folder("index"), HALL)
+    path.write_bytes(path.read_bytes()[::-1])
+    with pytest.raises(IntegrityError, match=r"surface\.npz must hold what `wsm index` wrote, found other bytes"):
+        indexed.run("map")
 
 
 def test_it_starts_from_a_finished_index(make_pipeline):

@@ -284,6 +284,17 @@ def test_partial_is_no_setting(encoded):
     assert not open_release(encoded.release).manifest.partial  # nothing was pending
 
 
+@pytest.mark.parametrize(
+    ("stage", "name"), [("index", "episodes.jsonl"), ("split", "split.jsonl"), ("encode", "codec.json")]
+)
+def test_a_table_that_changed_since_its_stage_wrote_it_is_refused(encoded, stage, name):
+    """A space more is the same JSON, and other bytes."""
+    path = encoded.folder(stage) / name
+    path.write_text(path.read_text().replace(": ", ":  ").replace('":', '": ', 1))
+    with pytest.raises(IntegrityError, match=rf"{name} must hold what `wsm {stage}` wrote, found other bytes"):
+        encoded.run("pack")
+
+
 @pytest.mark.parametrize(("suffix", "redone"), [("clip", "*"), ("json", "*"), ("json", MANIFEST)])
 def test_a_clip_that_changed_after_encode_is_refused_and_packed_once_it_is_made_again(encoded, suffix, redone):
     """Where the manifest alone is written again, sidecars are read for it, and no fragment."""
