@@ -39,6 +39,13 @@ def read_clip(reader, span):
     return bytes(target)
 
 
+def read_until_closed(reader, span, outcomes):
+    try:
+        read_clip(reader, span)
+    except StoreError as error:
+        outcomes.append(str(error))
+
+
 def shards_of(published):
     return [shard.name for shard in published.manifest.shards]
 
@@ -217,19 +224,25 @@ def test_a_cache_without_a_folder_is_refused(open_reader):
         open_reader(cache_dir="")
 
 
+def test_what_the_store_hangs_over_does_not_hold_up_another_shard(open_reader, published, remote):
+    reader = open_reader(request_timeout_s=30.0)
+    hanging, wanted = first_spans(published)[:2]
+    remote.proxy.spoil(hanging.shard, Fault.HANG, FOREVER)
+    waiting = threading.Thread(target=read_until_closed, args=(reader, hanging, []))
+    waiting.start()
+    wait_for(lambda: remote.proxy.spoiled() >= 1)
+    assert read_clip(reader, wanted) == published.bytes_of(wanted)
+    assert waiting.is_alive()
+    reader.close()
+    waiting.join(timeout=120)
+
+
 def test_closing_gives_up_what_hangs_and_ends_the_threads(open_reader, published, remote):
     reader = open_reader(request_timeout_s=30.0)
     remote.proxy.spoil(r"\.tar", Fault.HANG, FOREVER)
     reader.expect(published.spans)
     outcomes = []
-
-    def read():
-        try:
-            read_clip(reader, published.spans[-1])
-        except StoreError as error:
-            outcomes.append(str(error))
-
-    waiting = threading.Thread(target=read)
+    waiting = threading.Thread(target=read_until_closed, args=(reader, published.spans[-1], outcomes))
     waiting.start()
     wait_for(lambda: remote.proxy.spoiled() >= 1)
     reader.close()
