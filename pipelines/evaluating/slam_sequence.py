@@ -42,7 +42,7 @@ class Reconstruction:
 
 def shown_frames(clip: Clip) -> range:
     """The last frame of each latent; still frames that were added to the clip are left out."""
-    return range(0, clip.meta.frames - clip.meta.padded_frames, TEMPORAL_RATIO)
+    return range(0, clip.meta.recorded_frames, TEMPORAL_RATIO)
 
 
 def true_reconstruction(clip: Clip, decoded: DecodedVideo) -> Reconstruction:
@@ -82,7 +82,7 @@ def reconstruction(
         poses: of all frames, likewise; [T, 7].
         seen: pixels [N, H, W] that have a depth; None for all.
     """
-    recorded = clip.meta.frames - clip.meta.padded_frames
+    recorded = clip.meta.recorded_frames
     T_camera0_camera = transforms_from_vectors(poses[:recorded])
     rays = pixel_rays(clip.intrinsics)
     kept = depth_m <= MAX_DEPTH_M

@@ -39,7 +39,7 @@ class DecodedVideo:
 
     def __repr__(self) -> str:
         count, height, width = self.depth_m.shape
-        return f"<DecodedVideo: {count} frames of {width} x {height} px, colour and depth>"
+        return f"<DecodedVideo: {count} frames of {width} x {height} px, depth measured in {self.measured.mean():.0%}>"
 
 
 def decode_video(clip: Clip, codec: VideoCodec, frames: Sequence[int] | None = None) -> DecodedVideo:

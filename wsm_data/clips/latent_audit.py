@@ -70,7 +70,7 @@ def audit_latents(audited: AuditedClip) -> Verdict:
         DataError: a frame does not decode.
     """
     meta, record = audited.clip.meta, audited.record
-    own_frames = meta.frames - meta.padded_frames
+    own_frames = meta.recorded_frames
     if record.content_digest != meta.source_digest or record.frame_count != own_frames:
         return Verdict(
             reason=Reason.LATENT_SOURCE_CHANGED,

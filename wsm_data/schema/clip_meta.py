@@ -86,6 +86,11 @@ class ClipMeta:
             )
 
     @property
+    def recorded_frames(self) -> int:
+        """Raw frames that were recorded: all but the still ones at the end."""
+        return self.frames - self.padded_frames
+
+    @property
     def T_world_camera0_matrix(self) -> Float64Array:
         """First camera to world, float64 [4, 4], m."""
         return np.array(self.T_world_camera0, np.float64)

@@ -29,7 +29,7 @@ def export_tum(location: str, out: Path, split: str, limit: int, weights: str) -
     _claim(out, release)
     for key in chosen:
         clip = release.read_clip(key)
-        frames = range(clip.frame_count - clip.meta.padded_frames)
+        frames = range(clip.meta.recorded_frames)
         decoded = release.decode(clip, frames=frames, weights=weights)
         write_tum_sequence(out / key.replace("/", "."), clip, decoded)
     typer.echo(f"{len(chosen)} of {len(keys)} clips: {out}")

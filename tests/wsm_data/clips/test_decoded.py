@@ -71,4 +71,6 @@ def test_a_clip_of_another_codec_is_not_decoded(clip, seen):
 
 
 def test_it_is_shown_in_a_line(clip, seen):
-    assert repr(decode_video(clip, seen[1], (0,))) == "<DecodedVideo: 1 frames of 160 x 96 px, colour and depth>"
+    bare = dataclasses.replace(clip, depth_latent=None, depth_valid=None)
+    said = repr(decode_video(bare, seen[1], (0,)))
+    assert said == "<DecodedVideo: 1 frames of 160 x 96 px, depth measured in 0%>"

@@ -47,7 +47,7 @@ def read_labels(release: Release, row: IndexRow) -> ClipLabels:
     """
     content = {name: release.read_member(row, name) for name in _LABELS}
     meta = _meta(content[META], row)
-    poses = np.frombuffer(content["poses"], STORED_DTYPES["poses"]).reshape(-1, 7)[: meta.frames - meta.padded_frames]
+    poses = np.frombuffer(content["poses"], STORED_DTYPES["poses"]).reshape(-1, 7)[: meta.recorded_frames]
     path_m = (meta.T_world_camera0_matrix @ transforms_from_vectors(poses.astype(np.float64)))[:, :3, 3]
     below = np.array([0.0, 0.0, meta.camera_height_m])
     return ClipLabels(

@@ -105,7 +105,7 @@ class Trajectory:
 def trajectory_of(clip: Clip) -> Trajectory:
     """The trajectory of a stored clip; where its map does not reach, nothing is known."""
     meta = clip.meta
-    T_camera0_camera = transforms_from_vectors(clip.poses[: meta.frames - meta.padded_frames].astype(np.float64))
+    T_camera0_camera = transforms_from_vectors(clip.poses[: meta.recorded_frames].astype(np.float64))
     T_world_camera = meta.T_world_camera0_matrix @ T_camera0_camera
     goal_xy_m = np.array(meta.goal_world_m[:2], np.float64)
     grid = OccupancyGrid(cells=clip.occupancy, origin_cell=meta.map_origin_cell, resolution_m=meta.map_resolution_m)

@@ -15,7 +15,7 @@ from matplotlib.ticker import MaxNLocator
 from wsm_data.codecs.base import VideoCodec
 from wsm_data.files.atomic import write_bytes
 from wsm_data.schema.clip import Clip
-from wsm_data.view.clip.facts import depth_valid_share, moving_frames, world_path_m
+from wsm_data.view.clip.facts import depth_valid_share, world_path_m
 from wsm_data.view.clip.map_plot import PATH_COLOUR, draw_clip_map, draw_frame_marks, map_key
 from wsm_data.view.clip.pictures import ClipPictures, decode_pictures, spread_frames
 from wsm_data.view.drawing.depth_colours import draw_depth_bar
@@ -56,7 +56,7 @@ def draw_contact_sheet(clip: Clip, codec: VideoCodec, path: Path) -> None:
     Raises:
         ConfigError: the clip was encoded with another codec.
     """
-    pictures = decode_pictures(clip, codec, spread_frames(moving_frames(clip), _COLUMNS * _BANDS))
+    pictures = decode_pictures(clip, codec, spread_frames(clip.meta.recorded_frames, _COLUMNS * _BANDS))
     with figure_style():
         write_bytes(path, figure_png(contact_sheet_figure(clip, pictures)))
 
@@ -100,7 +100,7 @@ def _draw_header(figure: Figure, clip: Clip) -> None:
         meta.dataset,
         f"camera {meta.id.camera}, {meta.camera_height_m:.2f} m high, {np.rad2deg(meta.camera_pitch_rad):.1f}° down",
         f"codec {meta.codec} {meta.codec_digest[:12]}",
-        f"{moving_frames(clip)} frames + {meta.padded_frames} still = {clip.latent_count} latents",
+        f"{clip.meta.recorded_frames} frames + {meta.padded_frames} still = {clip.latent_count} latents",
         "no depth" if (measured := depth_valid_share(clip)) is None else f"depth measured {measured:.1%}",
         f"map from {meta.map_from}, {meta.map_resolution_m * 100:g} cm cells",
     )
@@ -188,7 +188,7 @@ def _draw_progress(axes: Axes, clip: Clip) -> None:
 def _finish_time_axes(axes: Axes, clip: Clip) -> None:
     last = clip.frame_count - 1
     if clip.meta.padded_frames:
-        first_still = moving_frames(clip) - 0.5
+        first_still = clip.meta.recorded_frames - 0.5
         axes.axvspan(first_still, last + 0.5, facecolor=GRID, alpha=0.6, lw=0, zorder=0)
         middle = (first_still + last + 0.5) / 2
         place: dict[str, Any] = {

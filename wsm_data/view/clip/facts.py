@@ -61,7 +61,7 @@ def clip_facts(clip: Clip) -> ClipFacts:
     clearance_m = path_clearance_m(clip.grid, path_xy_m)
     return ClipFacts(
         key=meta.key,
-        frames=moving_frames(clip),
+        frames=clip.meta.recorded_frames,
         padded_frames=meta.padded_frames,
         path_length_m=float(np.linalg.norm(np.diff(path_xy_m, axis=0), axis=1).sum()),
         start_distance_m=float(clip.expert_distance[0]),
@@ -77,14 +77,9 @@ def clip_facts(clip: Clip) -> ClipFacts:
     )
 
 
-def moving_frames(clip: Clip) -> int:
-    """Raw frames of a clip, the padded still frames at its end not counted."""
-    return clip.frame_count - clip.meta.padded_frames
-
-
 def world_path_m(clip: Clip) -> Float64Array:
     """Camera positions in the world, m, padding left out; float64 [T - padded, 3]."""
-    positions = clip.poses[: moving_frames(clip), :3].astype(np.float64)
+    positions = clip.poses[: clip.meta.recorded_frames, :3].astype(np.float64)
     return transform_points(clip.meta.T_world_camera0_matrix, positions)
 
 

@@ -27,7 +27,7 @@ from wsm_data.geometry.transform import transforms_from_vectors
 from wsm_data.schema.arrays import Float64Array
 from wsm_data.schema.clip import Clip
 from wsm_data.schema.occupancy import UNKNOWN
-from wsm_data.view.clip.facts import clip_field_m, moving_frames, world_path_m
+from wsm_data.view.clip.facts import clip_field_m, world_path_m
 from wsm_data.view.clip.map_plot import GOAL_COLOUR, PATH_COLOUR, UNKNOWN_COLOUR, cell_picture
 from wsm_data.view.clip.text import describe_clip
 
@@ -56,7 +56,7 @@ def write_rerun(clip: Clip, codec: VideoCodec, path: Path) -> None:
         ConfigError: rerun is not installed or switched off, or the clip was encoded with another codec.
     """
     rr = _import_rerun()
-    decoded = decode_video(clip, codec, range(moving_frames(clip)))
+    decoded = decode_video(clip, codec, range(clip.meta.recorded_frames))
     with TemporaryDirectory() as folder, _strict(rr):
         saved = Path(folder) / "clip.rrd"
         stream = rr.RecordingStream(_APPLICATION, recording_id=digest_json(to_json(clip.meta)))
@@ -66,7 +66,7 @@ def write_rerun(clip: Clip, codec: VideoCodec, path: Path) -> None:
         for entity, archetype in (_still_entities(rr, clip) | _image_formats(rr, clip)).items():
             stream.log(entity, archetype, static=True)
         for entity, (first_frame, columns) in (_poses_and_curves(rr, clip) | _images(rr, decoded)).items():
-            times = rr.TimeColumn(TIMELINE, sequence=np.arange(first_frame, moving_frames(clip)))
+            times = rr.TimeColumn(TIMELINE, sequence=np.arange(first_frame, clip.meta.recorded_frames))
             stream.send_columns(entity, indexes=[times], columns=columns)
         stream.disconnect()
         write_bytes(path, saved.read_bytes())
@@ -111,7 +111,7 @@ def _poses_and_curves(rr: ModuleType, clip: Clip) -> dict[str, tuple[int, Any]]:
 
     Progress of step l is D(l - 1) - D(l) and stands at frame l, so frame 0 has none.
     """
-    frames = moving_frames(clip)
+    frames = clip.meta.recorded_frames
     T_world_camera = clip.meta.T_world_camera0_matrix @ transforms_from_vectors(clip.poses[:frames].astype(np.float64))
     distance_m = clip.expert_distance[:frames].astype(np.float64)
     pose = rr.Transform3D.columns(translation=T_world_camera[:, :3, 3], mat3x3=T_world_camera[:, :3, :3])

@@ -7,7 +7,7 @@ import numpy as np
 
 from wsm_data.codecs.base import VideoCodec
 from wsm_data.schema.clip import Clip
-from wsm_data.view.clip.facts import moving_frames, world_path_m
+from wsm_data.view.clip.facts import world_path_m
 from wsm_data.view.clip.pictures import decode_pictures
 from wsm_data.view.navigation.film import FilmFrame, write_film
 
@@ -34,7 +34,7 @@ def write_clip_film(clip: Clip, codec: VideoCodec, path: Path) -> int:
 
 def clip_film_frames(clip: Clip, codec: VideoCodec) -> Iterator[FilmFrame]:
     """One frame for each raw frame that is not padded; nothing stands beside the colour where there is no depth."""
-    count = moving_frames(clip)
+    count = clip.meta.recorded_frames
     pictures, way_m = decode_pictures(clip, codec, range(count)), world_path_m(clip)[:, :2]
     for number in range(count):
         yield FilmFrame(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from wsm_data.access.release import Release
 from wsm_data.codecs.base import VideoCodec
 from wsm_data.schema.clip import Clip
-from wsm_data.view.clip.facts import ClipFacts, clip_facts, moving_frames
+from wsm_data.view.clip.facts import ClipFacts, clip_facts
 from wsm_data.view.clip.pictures import ClipPictures, decode_pictures, spread_frames
 from wsm_data.view.clip.scene_overview import SceneOverview, ScenePath, scene_overview, scene_path
 
@@ -84,7 +84,7 @@ def survey_clips(release: Release, codec: VideoCodec, config: SurveyConfig | Non
         split, clip = rows[key].split, release.read_row(rows[key])
         facts.append(clip_facts(clip))
         if key in shown:
-            pictures = decode_pictures(clip, codec, spread_frames(moving_frames(clip), config.pictures))
+            pictures = decode_pictures(clip, codec, spread_frames(clip.meta.recorded_frames, config.pictures))
             thumbnails.append(ClipThumbnail(split=split, clip=clip, pictures=pictures))
         if len(paths.get(scene_of[key], range(config.paths))) < config.paths:
             paths[scene_of[key]].append(scene_path(clip, split))

@@ -13,7 +13,6 @@ from wsm_data.curation.explain import score_label, value_text
 from wsm_data.curation.survey import ScoreSurvey, SelectionSurvey, SelectionSurveyConfig, SurveyedClip, survey_selection
 from wsm_data.files.atomic import write_bytes
 from wsm_data.schema.arrays import Float64Array
-from wsm_data.view.clip.facts import moving_frames
 from wsm_data.view.clip.map_figures import clip_map_figure
 from wsm_data.view.clip.map_plot import MAP_SWATCHES
 from wsm_data.view.clip.pictures import decode_pictures, spread_frames
@@ -145,7 +144,7 @@ def _range(overlaps: tuple[float, ...]) -> tuple[float, float, float] | None:
 
 def _card(release: Release, codec: VideoCodec, name: str, shown: SurveyedClip) -> _Card:
     clip = release.read_clip(shown.key)
-    pictures = decode_pictures(clip, codec, spread_frames(moving_frames(clip), _PICTURES))
+    pictures = decode_pictures(clip, codec, spread_frames(clip.meta.recorded_frames, _PICTURES))
     return _Card(
         key=shown.key,
         rank=shown.rank,

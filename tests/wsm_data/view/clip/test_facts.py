@@ -8,7 +8,6 @@ from wsm_data.view.clip.facts import (
     clip_facts,
     clip_field_m,
     depth_valid_share,
-    moving_frames,
     path_clearance_m,
     world_path_m,
 )
@@ -76,7 +75,7 @@ def test_padding_does_not_count_towards_measured_depth(made):
 
 
 def test_moving_frames_leave_the_padding_out(clip, made):
-    assert moving_frames(clip) == made.frames - made.padded
+    assert clip.meta.recorded_frames == made.frames - made.padded
 
 
 @given(st.integers(0, 2**32 - 1))

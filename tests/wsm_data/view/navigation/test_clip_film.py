@@ -4,7 +4,7 @@ import pytest
 
 from wsm_data.clips.decoded import decode_video
 from wsm_data.errors import ConfigError
-from wsm_data.view.clip.facts import moving_frames, world_path_m
+from wsm_data.view.clip.facts import world_path_m
 from wsm_data.view.drawing.depth_colours import depth_picture
 from wsm_data.view.navigation.clip_film import clip_film_frames, write_clip_film
 
@@ -12,7 +12,7 @@ from wsm_data.view.navigation.clip_film import clip_film_frames, write_clip_film
 def test_colour_depth_and_way_of_a_frame_are_of_the_same_moment(clip, made):
     decoded = decode_video(clip, made.codec)
     frames = list(clip_film_frames(clip, made.codec))
-    assert len(frames) == moving_frames(clip) == clip.frame_count - clip.meta.padded_frames
+    assert len(frames) == clip.meta.recorded_frames == clip.frame_count - clip.meta.padded_frames
     for number, frame in enumerate(frames):
         depth_u8 = depth_picture(decoded.depth_m[number], clip.meta.depth_range, decoded.measured[number])
         assert np.array_equal(frame.seen_u8, decoded.rgb[number])
@@ -23,9 +23,9 @@ def test_colour_depth_and_way_of_a_frame_are_of_the_same_moment(clip, made):
 
 def test_the_film_of_a_clip_has_its_moving_frames(clip, made, tmp_path):
     path = tmp_path / "clip.mp4"
-    assert write_clip_film(clip, made.codec, path) == moving_frames(clip)
+    assert write_clip_film(clip, made.codec, path) == clip.meta.recorded_frames
     reader = cv2.VideoCapture(str(path))
-    assert int(reader.get(cv2.CAP_PROP_FRAME_COUNT)) == moving_frames(clip)
+    assert int(reader.get(cv2.CAP_PROP_FRAME_COUNT)) == clip.meta.recorded_frames
     assert reader.read()[1].shape == (720, 960, 3)
 
 
