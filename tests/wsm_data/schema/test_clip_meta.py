@@ -27,6 +27,10 @@ def test_a_meta_comes_back_with_the_same_types(meta_fields):
         assert type(getattr(back, name)) is type(value), name
 
 
+def test_recorded_frames_leave_the_padding_out(meta_fields):
+    assert ClipMeta(**{**meta_fields, "frames": 9, "padded_frames": 2}).recorded_frames == 7
+
+
 @given(matrix=st.lists(NUMBERS, min_size=16, max_size=16), goal=st.tuples(NUMBERS, NUMBERS, NUMBERS))
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])  # the fixture's fields are not changed
 def test_every_float_comes_back_to_the_bit(meta_fields, matrix, goal):

@@ -74,10 +74,6 @@ def test_padding_does_not_count_towards_measured_depth(made):
     assert depth_valid_share(made.clip(depth_valid=depth_valid, padded_frames=3)) == pytest.approx(0.75)
 
 
-def test_moving_frames_leave_the_padding_out(clip, made):
-    assert clip.meta.recorded_frames == made.frames - made.padded
-
-
 @given(st.integers(0, 2**32 - 1))
 def test_clearance_is_the_least_distance_to_any_occupied_square(seed):
     rng = np.random.default_rng(seed)

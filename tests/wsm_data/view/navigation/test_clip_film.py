@@ -21,7 +21,7 @@ def test_colour_depth_and_way_of_a_frame_are_of_the_same_moment(clip, made):
         assert frame.caption[1] == f"frame {number + 1} of {len(frames)}"
 
 
-def test_the_film_of_a_clip_has_its_moving_frames(clip, made, tmp_path):
+def test_the_film_of_a_clip_has_its_recorded_frames(clip, made, tmp_path):
     path = tmp_path / "clip.mp4"
     assert write_clip_film(clip, made.codec, path) == clip.meta.recorded_frames
     reader = cv2.VideoCapture(str(path))
