@@ -103,9 +103,9 @@ def test_as_many_clips_are_exported_as_asked_for_each_in_a_folder_of_its_own(rel
     app(["export", "tum", str(release), "--split", "train", "--limit", "2", "-o", str(tmp_path)], standalone_mode=False)
     assert capsys.readouterr().out == f"2 of 3 clips: {tmp_path}\n"
     first = open_release(release).keys(split="train")[:2]
-    folders = {path.name for path in tmp_path.iterdir() if path.is_dir()}
-    assert folders == {key.replace("/", ".") for key in first}
-    assert all(len((path / "groundtruth.txt").read_text().splitlines()) == 5 for path in tmp_path.iterdir())
+    folders = [path for path in tmp_path.iterdir() if path.is_dir()]
+    assert {path.name for path in folders} == {key.replace("/", ".") for key in first}
+    assert all(len((path / "groundtruth.txt").read_text().splitlines()) == 5 for path in folders)
 
 
 def test_without_a_name_the_sheet_is_called_after_its_clip(release, capsys, tmp_path, monkeypatch):
