@@ -13,6 +13,7 @@ from wsm_data.metrics.bootstrap import estimate_over_scenes
 from wsm_data.metrics.icp import IcpConfig
 from wsm_data.metrics.reconstruction import ReconstructionErrors, reconstruction_errors
 from wsm_data.metrics.trajectory import ate_rmse_unaligned_m, ate_sim3
+from wsm_data.schema.arrays import Float64Array
 
 METRICS = (
     "ate_rmse_sim3_m",
@@ -71,6 +72,19 @@ def sequence_errors(key: str, scene: str, estimated: Reconstruction, true: Recon
     except DataError as error:
         found["refused"] = error.reason.value
     return SequenceErrors(key=key, scene=scene, **found)  # type: ignore[arg-type]
+
+
+def compared_centres(estimated: Reconstruction, true: Reconstruction) -> dict[str, Float64Array]:
+    """Camera centres [T, 3] in m, of what can be compared: `true`, `estimated, as it is`, `estimated, aligned`."""
+    found = {"true": true.trajectory.centres_m}
+    try:
+        mine, theirs = associate(estimated.trajectory.stamps_s, true.trajectory.stamps_s)
+        centres = estimated.trajectory.centres_m[mine]
+        found["estimated, as it is"] = centres
+        found["estimated, aligned"] = ate_sim3(centres, found["true"][theirs]).alignment.apply(centres)
+    except DataError:
+        pass  # `sequence_errors` says the reason
+    return found
 
 
 def summarise(errors: Sequence[SequenceErrors], seed: int) -> Mapping[str, object]:

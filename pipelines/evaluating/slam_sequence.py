@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pipelines.evaluating.keyframe_points import POINTS_FOLDER, read_keyframe_points
 from wsm_data.clips.decoded import DecodedVideo, valid_cells
 from wsm_data.codecs.ply import ply_bytes
 from wsm_data.errors import ConfigError, DataError, Reason
@@ -19,8 +20,8 @@ from wsm_data.schema.point_cloud import PointCloud
 from wsm_data.schema.sequence import TEMPORAL_RATIO
 
 TRAJECTORY_FILES = ("trajectory.txt", "final_traj.txt")
-CLOUD_FILES = ("cloud.ply", "final.ply")
-"""As they are written here, and as SLAM-Former leaves them."""
+CLOUD_FILES = ("cloud.ply", "final.ply", POINTS_FOLDER)
+"""As they are written here, and as SLAM-Former leaves them; the first that is there counts, for it leaves two."""
 
 MAX_DEPTH_M = 5.0
 """What is farther is no point, neither of the truth nor of an estimate."""
@@ -121,17 +122,15 @@ def read_reconstruction(folder: Path) -> Reconstruction:
         DataError: a file is missing, or is none of its kind.
     """
     trajectory = read_tum(_one_of(folder, TRAJECTORY_FILES, Reason.TRAJECTORY_UNREADABLE))
-    cloud = read_point_cloud(_one_of(folder, CLOUD_FILES, Reason.CLOUD_MISSING))
+    found = _one_of(folder, CLOUD_FILES, Reason.CLOUD_MISSING)
+    cloud = read_keyframe_points(found) if found.is_dir() else read_point_cloud(found)
     require_finite_points(cloud)
     return Reconstruction(trajectory=trajectory, cloud=cloud)
 
 
 def _one_of(folder: Path, names: tuple[str, ...], reason: Reason) -> Path:
-    found = [folder / name for name in names if (folder / name).is_file()]
-    if len(found) != 1:
-        raise DataError(
-            reason,
-            f"{folder} must hold one of {' and '.join(names)}, found {len(found)}; put the estimate there",
-            {"folder": folder},
-        )
+    found = [folder / name for name in names if (folder / name).exists()]
+    if not found:
+        message = f"{folder} must hold one of {', '.join(names)}, found none; put the estimate there"
+        raise DataError(reason, message, {"folder": folder})
     return found[0]

@@ -9,7 +9,7 @@ import pyarrow as pa
 import typer
 from tqdm import tqdm
 
-from pipelines.evaluating.slam_errors import METRICS, SequenceErrors, sequence_errors, summarise
+from pipelines.evaluating.slam_errors import METRICS, SequenceErrors, compared_centres, sequence_errors, summarise
 from pipelines.evaluating.slam_sequence import (
     Reconstruction,
     read_reconstruction,
@@ -24,6 +24,7 @@ from wsm_data.files.atomic import write_text
 from wsm_data.files.tables import write_table
 from wsm_data.schema.clip import Clip
 from wsm_data.view.drawing.text_table import aligned
+from wsm_data.view.navigation.estimated_paths import draw_estimated_paths
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,7 +49,7 @@ class SlamRequest:
 
 
 def eval_slam(location: str, request: SlamRequest, out: Path, quiet: bool) -> None:
-    """Evaluate, write summary.json, sequences.parquet and every sequence's TUM and PLY, and print the means.
+    """Evaluate, write summary.json, sequences.parquet, every sequence's TUM, PLY and PNG, and print the means.
 
     Raises:
         ConfigError: not one of model and estimates is named, or there is no such split.
@@ -64,6 +65,7 @@ def eval_slam(location: str, request: SlamRequest, out: Path, quiet: bool) -> No
         estimated, true = estimate(clip, decoded), true_reconstruction(clip, decoded)
         for name, one in (("estimated", estimated), ("true", true)):
             write_reconstruction(out / "sequences" / key / name, one)
+        draw_estimated_paths(out / "sequences" / key / "paths.png", key, compared_centres(estimated, true))
         errors.append(sequence_errors(key, clip.meta.id.physical_scene, estimated, true))
     write_table(out / "sequences.parquet", sequence_table(errors))
     summary = {

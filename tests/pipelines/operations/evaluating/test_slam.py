@@ -3,6 +3,7 @@
 import json
 import shutil
 
+import cv2
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
@@ -15,6 +16,7 @@ from pipelines.training.config import TrainRunConfig
 from pipelines.training.data import model_config
 from wsm_data.access.release import open_release
 from wsm_data.loaders.config import SourceConfig
+from wsm_data.maps.arrays_file import save_arrays
 from wsm_data.metrics.tum import StampedTrajectory
 from wsm_data.schema.point_cloud import PointCloud
 from wsm_data.shards.latent_standard import latent_standard
@@ -106,6 +108,30 @@ def test_keyframes_of_another_scale_under_other_names_are_aligned(release, evalu
     assert found["ate_rmse_sim3_m"]["value"] < 1e-5
     assert found["acc_rmse_m"]["value"] < 1e-4
     assert found["ate_rmse_unaligned_m"]["value"] > 0.5
+
+
+def test_points_of_keyframes_are_read_where_no_cloud_was_joined_from_them(release, evaluated, tmp_path):
+    folder = moved(evaluated, tmp_path / "estimates", lambda one: one)
+    for path in list(folder.rglob("cloud.ply")):
+        cloud, points = read_reconstruction(path.parent).cloud, path.with_name("final_pc")
+        path.unlink()
+        for number, chosen in enumerate(np.array_split(np.arange(len(cloud.xyz_m)), 3)):
+            mask = np.ones((1, len(chosen) + 1), bool)
+            mask[0, -1] = False  # its point is not to be counted
+            xyz = np.concatenate([cloud.xyz_m[chosen], np.float32([[9, 9, 9]])])[None]
+            colours = np.concatenate([cloud.rgb_u8[chosen], np.uint8([[0, 0, 0]])])[None] / 255
+            save_arrays(points / f"{4 * number}.npz", {"pointcloud": xyz, "mask": mask, "color": colours})
+    code, text = wsm("eval", "slam", release, "--estimates", folder, "--out", tmp_path / "o", "--quiet")
+    assert code == 0, text
+    assert summary(tmp_path / "o")["acc_rmse_m"]["value"] < 1e-5
+    one = next(folder.rglob("final_pc")).parent
+    truth = evaluated / "sequences" / one.relative_to(folder) / "true"
+    np.testing.assert_array_equal(read_reconstruction(one).cloud.rgb_u8, read_reconstruction(truth).cloud.rgb_u8)
+
+
+def test_each_sequence_has_a_picture_of_its_ways(evaluated):
+    for row in pq.read_table(evaluated / "sequences.parquet").to_pylist():
+        assert cv2.imread(str(evaluated / "sequences" / row["key"] / "paths.png")).shape == (640, 720, 3)
 
 
 def test_a_sequence_without_an_estimate_is_refused_by_its_folder(release, tmp_path):
