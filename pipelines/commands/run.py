@@ -6,44 +6,16 @@ from typing import Annotated
 import typer
 
 from pipelines.commands.command import Command
-from pipelines.commands.options import (
-    Assignments,
-    Config,
-    DryRun,
-    Engine,
-    Fork,
-    Limit,
-    MaxRefused,
-    Only,
-    Out,
-    Quiet,
-    RetryRefused,
-    Workers,
-)
-from pipelines.commands.stage_options import REQUEST, RUN, filling, stage_request
+from pipelines.commands.stage_options import filling
 from pipelines.recipe import recipe_summaries
 from pipelines.running.options import StageRequest
 
 
 def run_recipe(
     recipe: Annotated[str, typer.Argument(metavar="RECIPE", help="Name of a recipe, or path of a TOML file.")],
-    out: Out,
-    config: Config = REQUEST.config,
-    assignments: Assignments = None,
-    workers: Workers = RUN.workers,
-    engine: Engine = REQUEST.engine,
-    limit: Limit = RUN.limit,
-    only: Only = None,
-    dry_run: DryRun = RUN.dry_run,
-    max_refused: MaxRefused = RUN.max_refused,
-    fork: Fork = RUN.fork,
-    retry_refused: RetryRefused = RUN.retry_refused,
-    quiet: Quiet = RUN.quiet,
+    request: StageRequest,
 ) -> None:
     """Run the stages of any recipe."""
-    request = stage_request(
-        out, config, assignments, workers, engine, limit, only, dry_run, max_refused, fork, retry_refused, quiet
-    )
     _run(recipe, request)
 
 
@@ -75,7 +47,10 @@ def _recipe_list() -> str:
 
 
 RUN_COMMAND = Command(
-    name="run", summary="Run the stages of a recipe into one run folder.", call=run_recipe, epilog=_recipe_list()
+    name="run",
+    summary="Run the stages of a recipe into one run folder.",
+    call=filling(run_recipe),
+    epilog=_recipe_list(),
 )
 DEMO_COMMAND = Command(name="demo", summary="The main job, end to end, on generated data.", call=filling(run_demo))
 STATUS_COMMAND = Command(

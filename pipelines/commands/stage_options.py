@@ -1,7 +1,8 @@
-"""What every command that runs stages takes: the signatures, and the value that the options become."""
+"""What every command that runs stages takes: the options, and the value that they become."""
 
-from collections.abc import Callable
-from pathlib import Path
+from collections.abc import Callable, Mapping
+from inspect import Parameter, Signature, signature
+from typing import Any
 
 from pipelines.commands.options import (
     Assignments,
@@ -19,89 +20,61 @@ from pipelines.commands.options import (
     RetryRefused,
     Workers,
 )
-from pipelines.running.engines.choice import EngineName
 from pipelines.running.options import RunOptions, StageRequest
 
 REQUEST = StageRequest()
-RUN = REQUEST.options
 """What stages are asked where the command line says nothing: the defaults of the options."""
 
+_OF_REQUEST: Mapping[str, object] = {"config": Config, "assignments": Assignments, "engine": Engine}
+_OF_RUN: Mapping[str, object] = {
+    "workers": Workers,
+    "limit": Limit,
+    "only": Only,
+    "dry_run": DryRun,
+    "max_refused": MaxRefused,
+    "fork": Fork,
+    "retry_refused": RetryRefused,
+    "quiet": Quiet,
+}
+"""Options by the field of `StageRequest` or `RunOptions` that each fills."""
 
-def filling(run: Callable[[StageRequest], None]) -> Callable[..., None]:
-    """A command that fills a folder."""
 
-    def command(
-        out: Out,
-        config: Config = REQUEST.config,
-        assignments: Assignments = None,
-        workers: Workers = RUN.workers,
-        engine: Engine = REQUEST.engine,
-        limit: Limit = RUN.limit,
-        only: Only = None,
-        dry_run: DryRun = RUN.dry_run,
-        max_refused: MaxRefused = RUN.max_refused,
-        fork: Fork = RUN.fork,
-        retry_refused: RetryRefused = RUN.retry_refused,
-        quiet: Quiet = RUN.quiet,
-    ) -> None:
-        run(
-            stage_request(
-                out, config, assignments, workers, engine, limit, only, dry_run, max_refused, fork, retry_refused, quiet
-            )
-        )
+def filling(run: Callable[..., None]) -> Callable[..., None]:
+    """A command that fills a folder: the options of stages, which `run` gets as `request`, after its own parameters."""
+    return _with_options(run, Parameter("out", Parameter.KEYWORD_ONLY, annotation=Out))
 
+
+def reading(run: Callable[..., None]) -> Callable[..., None]:
+    """As `filling`, for a command that looks at a `release`; a folder need not be given."""
+    release = Parameter("release", Parameter.KEYWORD_ONLY, annotation=Release)
+    return _with_options(run, _option("out", OutOfRelease, REQUEST.out), release)
+
+
+def stage_request(values: Mapping[str, Any]) -> StageRequest:
+    """The options of a command that runs stages as one value; others among the values are left out."""
+    given = {name: tuple(value or ()) if name in ("only", "assignments") else value for name, value in values.items()}
+    options = RunOptions(**{name: given[name] for name in _OF_RUN if name in given})
+    of_request = {name: given[name] for name in ("out", *_OF_REQUEST) if name in given}
+    return StageRequest(**of_request, options=options)
+
+
+def _with_options(run: Callable[..., None], out: Parameter, *first: Parameter) -> Callable[..., None]:
+    """`run` as typer reads it: the words of a command are those of a signature, and this one is put together."""
+    named = {one.name for one in first}
+    own = [one for one in signature(run).parameters.values() if one.name not in {"request", *named}]
+    options = [_option(name, kind, getattr(REQUEST, name)) for name, kind in _OF_REQUEST.items()]
+    options += [_option(name, kind, getattr(REQUEST.options, name)) for name, kind in _OF_RUN.items()]
+    parameters = [*first, *(one.replace(kind=Parameter.KEYWORD_ONLY) for one in own), out, *options]
+    passed = {*named, *(one.name for one in own)}
+
+    def command(**values: Any) -> None:
+        run(**{name: values[name] for name in passed}, request=stage_request(values))
+
+    command.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
+    command.__annotations__ = {one.name: one.annotation for one in parameters}
     return command
 
 
-def reading(run: Callable[[str, StageRequest], None]) -> Callable[..., None]:
-    """A command that looks at a release."""
-
-    def command(
-        release: Release,
-        out: OutOfRelease = REQUEST.out,
-        config: Config = REQUEST.config,
-        assignments: Assignments = None,
-        workers: Workers = RUN.workers,
-        engine: Engine = REQUEST.engine,
-        limit: Limit = RUN.limit,
-        only: Only = None,
-        dry_run: DryRun = RUN.dry_run,
-        max_refused: MaxRefused = RUN.max_refused,
-        fork: Fork = RUN.fork,
-        retry_refused: RetryRefused = RUN.retry_refused,
-        quiet: Quiet = RUN.quiet,
-    ) -> None:
-        request = stage_request(
-            out, config, assignments, workers, engine, limit, only, dry_run, max_refused, fork, retry_refused, quiet
-        )
-        run(release, request)
-
-    return command
-
-
-def stage_request(
-    out: Path | None,
-    config: Path | None,
-    assignments: list[str] | None,
-    workers: int,
-    engine: EngineName,
-    limit: int,
-    only: list[str] | None,
-    dry_run: bool,
-    max_refused: float,
-    fork: bool,
-    retry_refused: bool,
-    quiet: bool,
-) -> StageRequest:
-    """The options of a command that runs stages as one value."""
-    options = RunOptions(
-        workers=workers,
-        limit=limit,
-        only=tuple(only or ()),
-        dry_run=dry_run,
-        max_refused=max_refused,
-        fork=fork,
-        retry_refused=retry_refused,
-        quiet=quiet,
-    )
-    return StageRequest(out=out, config=config, assignments=tuple(assignments or ()), engine=engine, options=options)
+def _option(name: str, annotation: object, default: object) -> Parameter:
+    default = None if default == () else default  # typer's word for a repeatable option that is not there
+    return Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=annotation)

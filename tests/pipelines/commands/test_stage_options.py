@@ -1,6 +1,6 @@
 """The options of commands that run stages: each arrives where it belongs, and without one the dataclass decides."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import pytest
@@ -44,8 +44,8 @@ def ask(request, monkeypatch):
     monkeypatch.setattr(run_recipe, "run_recipe", lambda recipe, asked: seen.append(asked))
     monkeypatch.setattr(selecting, "run_select", lambda release, asked, **own: seen.append(asked))
     calls = {
-        "filling": (filling(seen.append), []),
-        "reading": (reading(lambda release, asked: seen.append(asked)), ["release"]),
+        "filling": (filling(lambda request: seen.append(request)), []),
+        "reading": (reading(lambda release, request: seen.append(request)), ["release"]),
         "run": (run.RUN_COMMAND.call, ["demo"]),
         "select": (select.COMMAND.call, ["release"]),
     }
@@ -70,17 +70,22 @@ def test_every_option_alone_changes_what_it_names_and_nothing_else(ask):
 def test_a_release_may_be_looked_at_without_a_folder():
     seen = []
     app = typer.Typer()
-    app.command()(reading(lambda release, asked: seen.append((release, asked))))
+    app.command()(reading(lambda release, request: seen.append((release, request))))
     CliRunner().invoke(app, ["somewhere"])
     assert seen == [("somewhere", StageRequest())]
 
 
 def test_a_stage_that_fills_a_folder_must_be_given_one():
     app = typer.Typer()
-    app.command()(filling(lambda asked: None))
+    app.command()(filling(lambda request: None))
     done = CliRunner().invoke(app, [])
     assert done.exit_code == 2
     assert "--out" in done.output
+
+
+def test_every_field_of_a_request_has_an_option():
+    fields_of = {field.name for kind in (StageRequest, RunOptions) for field in fields(kind)} - {"options"}
+    assert {name for changes in ASKED.values() for name in changes} == fields_of
 
 
 def test_0_workers_are_one_for_each_core(monkeypatch):
