@@ -16,6 +16,7 @@ from pipelines.commands.clips import export, film
 from pipelines.commands.command import Command, CommandGroup
 from pipelines.commands.evaluating import group as evaluate
 from pipelines.commands.models import dream
+from pipelines.commands.runs import clean, retry
 from pipelines.commands.soundness import audit_latents, check, preflight
 from pipelines.running.interrupts import (
     INTERRUPTED_EXIT_CODE,
@@ -32,6 +33,8 @@ COMMANDS: tuple[Command | CommandGroup, ...] = (
     run.RUN_COMMAND,
     run.DEMO_COMMAND,
     run.STATUS_COMMAND,
+    clean.COMMAND,
+    retry.COMMAND,
     settings.COMMAND,
     inspect.COMMAND,
     film.COMMAND,

@@ -31,4 +31,15 @@ MaxRefused = Annotated[
 ]
 Fork = Annotated[bool, typer.Option("--fork", help="With changed settings, write beside --out instead of stopping.")]
 RetryRefused = Annotated[bool, typer.Option("--retry-refused", help="Try again what was refused before.")]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress bars.")]
+RetryReasons = Annotated[
+    list[str] | None,
+    typer.Option("--retry-reason", help="Try again what was refused for this reason code. Repeatable."),
+]
+Reclaim = Annotated[
+    bool, typer.Option("--reclaim", help="Delete each clip of encode once its shard is written; not with --limit.")
+]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress bars, no line a unit.")]
+Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="A line a unit in place of the bar, and more.")]
+LogFile = Annotated[
+    Path | None, typer.Option("--log-file", help="File to which a line a unit, warnings and tables are added.")
+]

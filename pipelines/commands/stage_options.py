@@ -11,13 +11,17 @@ from pipelines.commands.options import (
     Engine,
     Fork,
     Limit,
+    LogFile,
     MaxRefused,
     Only,
     Out,
     OutOfRelease,
     Quiet,
+    Reclaim,
     Release,
+    RetryReasons,
     RetryRefused,
+    Verbose,
     Workers,
 )
 from pipelines.running.options import RunOptions, StageRequest
@@ -25,7 +29,12 @@ from pipelines.running.options import RunOptions, StageRequest
 REQUEST = StageRequest()
 """What stages are asked where the command line says nothing: the defaults of the options."""
 
-_OF_REQUEST: Mapping[str, object] = {"config": Config, "assignments": Assignments, "engine": Engine}
+_OF_REQUEST: Mapping[str, object] = {
+    "config": Config,
+    "assignments": Assignments,
+    "engine": Engine,
+    "log_file": LogFile,
+}
 _OF_RUN: Mapping[str, object] = {
     "workers": Workers,
     "limit": Limit,
@@ -34,7 +43,10 @@ _OF_RUN: Mapping[str, object] = {
     "max_refused": MaxRefused,
     "fork": Fork,
     "retry_refused": RetryRefused,
+    "retry_reasons": RetryReasons,
+    "reclaim": Reclaim,
     "quiet": Quiet,
+    "verbose": Verbose,
 }
 """Options by the field of `StageRequest` or `RunOptions` that each fills."""
 
@@ -52,7 +64,10 @@ def reading(run: Callable[..., None]) -> Callable[..., None]:
 
 def stage_request(values: Mapping[str, Any]) -> StageRequest:
     """The options of a command that runs stages as one value; others among the values are left out."""
-    given = {name: tuple(value or ()) if name in ("only", "assignments") else value for name, value in values.items()}
+    given: dict[str, Any] = {
+        name: tuple(value or ()) if name in ("only", "assignments", "retry_reasons") else value
+        for name, value in values.items()
+    }
     options = RunOptions(**{name: given[name] for name in _OF_RUN if name in given})
     of_request = {name: given[name] for name in ("out", *_OF_REQUEST) if name in given}
     return StageRequest(**of_request, options=options)
@@ -68,7 +83,11 @@ def _with_options(run: Callable[..., None], out: Parameter, *first: Parameter) -
     passed = {*named, *(one.name for one in own)}
 
     def command(**values: Any) -> None:
-        run(**{name: values[name] for name in passed}, request=stage_request(values))
+        from pipelines.running.logs import logged
+
+        request = stage_request(values)
+        with logged(request):
+            run(**{name: values[name] for name in passed}, request=request)
 
     command.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
     command.__annotations__ = {one.name: one.annotation for one in parameters}

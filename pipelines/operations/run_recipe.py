@@ -4,18 +4,15 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-import typer
-
 from pipelines.operations.dry_run import show_run
 from pipelines.operations.run_stage import print_result
+from pipelines.operations.runs.in_order import run_in_order
 from pipelines.recipe import Recipe, load_recipe, stage_config
 from pipelines.registry import load_stage
 from pipelines.running.conflict import conflict, fingerprint
 from pipelines.running.engines.choice import engine
 from pipelines.running.options import StageRequest
-from pipelines.running.runner import run_stage
 from pipelines.running.settings import merge, parse_assignments
-from pipelines.running.stage_report import summary_table
 from wsm_data.codecs.registry import CodecConfig, describe_codec
 from wsm_data.errors import ConfigError
 from wsm_data.files.digest import digest_json
@@ -42,9 +39,7 @@ def run_recipe(recipe: str, request: StageRequest) -> None:
     if options.dry_run:
         show_run(configs, out, first, others)
         return
-    for position, (name, config) in enumerate(configs.items()):
-        report = run_stage(load_stage(name), config, out / name, others if position else first, run_engine)
-        typer.echo(summary_table([report]))  # now, for a later stage may stop the run
+    run_in_order(configs, out, lambda name: first if name == next(iter(configs)) else others, run_engine)
     for name in configs:
         print_result(name, out / name)
 

@@ -10,6 +10,7 @@ from pipelines.operations.dry_run import show_stage
 from pipelines.recipe import stage_sections
 from pipelines.registry import load_stage
 from pipelines.running.engines.choice import engine
+from pipelines.running.logs import log_table
 from pipelines.running.options import StageRequest
 from pipelines.running.runner import run_stage
 from pipelines.running.settings import input_fields, merge, parse_assignments
@@ -67,7 +68,9 @@ def run_built(stage: Stage[ConfigT], config: ConfigT, out: Path, request: StageR
         show_stage(stage, config, out, request.options)
         return out
     report = run_stage(stage, config, out, request.options, engine(request.engine))
-    typer.echo(summary_table([report]))
+    table = summary_table([report])
+    typer.echo(table)
+    log_table(table)
     return report.out
 
 

@@ -5,7 +5,7 @@ A run writes a file of its own, and the first file holds it all again once the s
 
 import json
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -34,6 +34,7 @@ class LedgerEntry:
         sizes: bytes of its outputs when it was settled, in their order; None for what was no file.
         time: when it was settled, seconds since 1970.
         stale: the unit is pending by now, or not listed for the time being; its outputs are kept for when it returns.
+        given_up: those of its outputs that nothing needs any more: the unit is done whether they are there or not.
     """
 
     key: str
@@ -41,14 +42,18 @@ class LedgerEntry:
     sizes: tuple[int | None, ...] = ()
     time: float = 0.0
     stale: bool = False
+    given_up: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         outputs = len(self.outcome.outputs)
+        if others := set(self.given_up) - set(self.outcome.outputs):
+            raise ValueError(f"given_up must name outputs of the unit, found {', '.join(sorted(others))}")
         for name, values in (("sizes", self.sizes), ("digests", self.outcome.digests)):
             if values and len(values) != outputs:
                 raise ValueError(f"{name} must be of the {outputs} outputs, found {len(values)}")
 
 
+_LEFT_OUT_WHEN_EMPTY = ("stale", "given_up")
 _OF_OUTCOME = {field.name for field in fields(Outcome)}
 
 
@@ -63,7 +68,7 @@ def read_ledger(folder: Path, *, with_stale: bool = False) -> dict[str, LedgerEn
 
 
 def is_whole(folder: Path, entry: LedgerEntry) -> bool:
-    """Whether the outputs of a unit are as it left them.
+    """Whether the outputs of a unit, but those that were given up, are as it left them.
 
     Bytes are compared of files alone that were touched since: a stage may hold terabytes, which are not read to find
     that there is nothing to do. What a disk changes behind the system's back is found by who reads it.
@@ -71,17 +76,37 @@ def is_whole(folder: Path, entry: LedgerEntry) -> bool:
     outputs = entry.outcome.outputs
     unknown = (None,) * len(outputs)
     whole = zip(outputs, entry.sizes or unknown, entry.outcome.digests or unknown, strict=True)
-    return all(_is_output(folder / output, size, digest, entry.time) for output, size, digest in whole)
+    return all(
+        output in entry.given_up or _is_output(folder / output, size, digest, entry.time)
+        for output, size, digest in whole
+    )
 
 
 @contextmanager
-def ledger_appender(folder: Path) -> Iterator[Callable[[LedgerEntry], LedgerEntry]]:
+def ledger_amender(folder: Path) -> Iterator[Callable[[Iterable[LedgerEntry]], None]]:
+    """Open the ledger for other words on units that are settled; yields the function that brings entries to disk."""
+    with JournalWriter(folder, LEDGER) as journal:
+
+        def amend(entries: Iterable[LedgerEntry]) -> None:
+            for entry in entries:
+                journal.append(_line(entry))
+            journal.sync()
+
+        yield amend
+
+
+@contextmanager
+def ledger_appender(
+    folder: Path, sync_every_s: float = _SYNC_EVERY_S
+) -> Iterator[Callable[[LedgerEntry], LedgerEntry]]:
     """Open the ledger for more outcomes; yields the function that adds one, which then survives a kill.
+
+    It survives a power cut after `sync_every_s` (0: at once).
 
     That function returns the entry as a later run reads it (a tuple among the facts is a list by then), so that what
     follows cannot depend on whether the run was cut short.
     """
-    with JournalWriter(folder, LEDGER, _SYNC_EVERY_S) as journal:
+    with JournalWriter(folder, LEDGER, sync_every_s) as journal:
 
         def append(entry: LedgerEntry) -> LedgerEntry:
             sizes = tuple(size_on_disk(folder / output) for output in entry.outcome.outputs)
@@ -133,7 +158,7 @@ def _entries(folder: Path) -> Iterator[LedgerEntry]:
 def _line(entry: LedgerEntry) -> dict[str, Any]:
     line = to_json(entry)
     outcome = {**line.pop("outcome"), "seconds": round(entry.outcome.seconds, 4)}
-    return {**outcome, **{name: value for name, value in line.items() if name != "stale" or value}}
+    return {**outcome, **{name: value for name, value in line.items() if name not in _LEFT_OUT_WHEN_EMPTY or value}}
 
 
 def _entry(folder: Path, line: Mapping[str, Any]) -> LedgerEntry:

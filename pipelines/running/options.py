@@ -21,7 +21,10 @@ class RunOptions:
             a number: of refused units and refused parts together. What `finish` refuses counts as parts.
         fork: when the settings differ from those in the folder, use a folder beside it instead of stopping.
         retry_refused: try refused units again although neither their input nor the settings changed.
-        quiet: no progress bar.
+        retry_reasons: try units again of which something was refused for one of these reasons.
+        reclaim: give up what nothing needs any more (the clips of a shard that is written) while the stage works.
+        quiet: neither a bar nor a line a unit.
+        verbose: a line a unit where there would be a bar, and what else is worth knowing.
     """
 
     workers: int = 1
@@ -31,7 +34,10 @@ class RunOptions:
     max_refused: float = 0.1
     fork: bool = False
     retry_refused: bool = False
+    retry_reasons: tuple[str, ...] = ()
+    reclaim: bool = False
     quiet: bool = False
+    verbose: bool = False
 
     @property
     def processes(self) -> int:
@@ -48,6 +54,7 @@ class StageRequest:
         config: TOML file of differences, with a section per stage.
         assignments: `key=value` words of `--set`.
         engine: who runs the workers.
+        log_file: file to which a line a unit, warnings, tables and errors are added; None for none.
         options: what to run now.
     """
 
@@ -55,4 +62,5 @@ class StageRequest:
     config: Path | None = None
     assignments: tuple[str, ...] = ()
     engine: EngineName = EngineName.LOCAL
+    log_file: Path | None = None
     options: RunOptions = field(default_factory=lambda: RunOptions(workers=0))

@@ -3,14 +3,12 @@
 import fnmatch
 import time
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import closing
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, closing, nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Generic
-
-from tqdm import tqdm
 
 from pipelines.running.budget import RefusalCount, count_refusals, over_budget, with_outcome
 from pipelines.running.conflict import conflict, fingerprint
@@ -25,9 +23,11 @@ from pipelines.running.folder import (
     write_stage_record,
 )
 from pipelines.running.full_disk import full_disk_named
+from pipelines.running.given_up import reclaiming, require_given_back
 from pipelines.running.gone_folder import gone_folder_named
 from pipelines.running.ledger import LedgerEntry, compact_ledger, is_whole, ledger_appender, read_ledger
 from pipelines.running.options import RunOptions
+from pipelines.running.progress import progress
 from pipelines.running.quarantine import PENDING_FILE, QUARANTINE_FILE, write_pending, write_quarantine
 from pipelines.running.settings import config_json, settings_of
 from pipelines.running.stage import REFUSED, ConfigT, Finished, Outcome, Settled, Stage, StageContext, Unit, refused
@@ -85,6 +85,11 @@ def run_stage(
     upstream = upstream_records(config)  # before the listing: what changes while that is read is seen as newer
     waits_for = tuple(name for name in upstream if pending_units(Path(getattr(config, name))))
     units = stage.list_units(config)
+    if options.reclaim and stage.reads and waits_for:
+        raise ConfigError(
+            f"--reclaim gives up clips that `wsm {stage.name}` needs again when more follow, and there are pending "
+            f"units in {', '.join(waits_for)}; run the stages before it to their end, or leave --reclaim out"
+        )
     _require_unique(stage, units)
     _require_match(stage, units, options.only)
     record = _record(stage, config, upstream, len(units), options.processes)
@@ -113,6 +118,8 @@ def run_stage(
         remove_temporaries(out)
         job.ledger.update(_standing(out))
         selected = _selected(job)
+        if selected and stage.reads:
+            require_given_back(stage.reads(config, selected))
         if selected or not _is_finished(job):
             write_stage_record(out, record)  # unfinished from here to the end, for whoever reads it
             _work(job, selected)
@@ -120,6 +127,8 @@ def run_stage(
             _finish(job)
         else:
             _keep_record_current(job)
+            with _reclaiming(job, ()):
+                pass
     return _report(job, selected, time.monotonic() - started)
 
 
@@ -184,6 +193,8 @@ def _is_settled(job: _Job[ConfigT], unit: Unit) -> bool:
     entry = job.ledger.get(unit.id)
     if entry is None or entry.key != job.keys[unit.id]:
         return False
+    if any(refusal.reason in job.options.retry_reasons for refusal in entry.outcome.refusals):
+        return False
     return entry.outcome.state != REFUSED or not job.options.retry_refused
 
 
@@ -193,10 +204,10 @@ def _work(job: _Job[ConfigT], selected: Sequence[Unit]) -> None:
     count = replace(count_refusals(standing, len(job.units), job.stage.parts_fact), found=None)
     _keep_to_budget(job, count)
     work = partial(_process_batch, job.stage, job.config, StageContext(out=job.out))
-    hidden = job.options.quiet or not selected
     with (
-        tqdm(total=len(selected), desc=job.stage.name, unit="unit", disable=hidden, dynamic_ncols=True) as bar,
-        ledger_appender(job.out) as append,
+        progress(job.stage.name, len(selected), job.options) as tell,
+        _reclaiming(job, again) as reclaim,
+        _appender(job) as append,
         closing(
             job.engine(_batches(selected, job.options.processes), work, job.options.processes)
         ) as outcomes,  # no worker outlives the lock
@@ -204,8 +215,26 @@ def _work(job: _Job[ConfigT], selected: Sequence[Unit]) -> None:
         for outcome in outcomes:
             job.ledger[outcome.unit] = append(LedgerEntry(key=job.keys[outcome.unit], outcome=outcome))
             count = with_outcome(count, outcome)
-            bar.update()
+            tell(outcome)
             _keep_to_budget(job, count)
+            reclaim(outcome.unit)
+
+
+def _reclaiming(job: _Job[ConfigT], again: Collection[str]) -> AbstractContextManager[Callable[[str], None]]:
+    reads = job.stage.reads
+    if reads is None or not job.options.reclaim:
+        return nullcontext(_keep)
+    done = [name for name in job.settled().outcomes if name not in again]
+    return reclaiming(job.units, partial(reads, job.config), done)
+
+
+def _keep(unit: str) -> None:
+    """What is done with the inputs of a unit where nothing is reclaimed."""
+
+
+def _appender(job: _Job[ConfigT]) -> AbstractContextManager[Callable[[LedgerEntry], LedgerEntry]]:
+    """What is reclaimed is deleted after the line that says that it can be: that line must be on disk by then."""
+    return ledger_appender(job.out, sync_every_s=0.0) if job.options.reclaim else ledger_appender(job.out)
 
 
 def _keep_to_budget(job: _Job[ConfigT], count: RefusalCount, extra: Sequence[Refusal] = ()) -> None:

@@ -10,6 +10,9 @@ from wsm_data.schema.verdict import Refusal
 
 ConfigT = TypeVar("ConfigT")
 
+Reads: TypeAlias = Mapping[Path, Mapping[str, tuple[str, ...]]]
+"""Outputs that units read: by the folder of the stage that made them, and by its unit."""
+
 DONE, REFUSED = "done", "refused"
 
 
@@ -120,6 +123,8 @@ class Stage(Generic[ConfigT]):
             parts are judged; empty where a unit is one piece.
         finish_inputs: digest of each input that `finish` alone reads, by name; a changed one has it called again
             although no unit is redone. None where there is none.
+        reads: outputs of other stages that nothing but these units ever reads: once they are done, those can be given
+            up. None where there are none.
         conventions: what decides the outputs and stands in a file that a setting names; a dry run prints it beside the
             settings. None where there is no such file.
     """
@@ -132,6 +137,7 @@ class Stage(Generic[ConfigT]):
     finish: Callable[[ConfigT, StageContext, Settled], Finished] | None = None
     parts_fact: str = ""
     finish_inputs: Callable[[ConfigT], Mapping[str, str]] | None = None
+    reads: Callable[[ConfigT, Sequence[Unit]], Reads] | None = None
     conventions: Callable[[ConfigT], object] | None = None
 
 

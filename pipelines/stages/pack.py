@@ -10,7 +10,7 @@ from pipelines.artifacts.inventory import account_of
 from pipelines.artifacts.layout import clips_folder, codec_path, release_folder
 from pipelines.artifacts.source import indexed_source
 from pipelines.artifacts.split_table import read_split
-from pipelines.running.stage import Finished, Outcome, Settled, Stage, StageContext, Unit
+from pipelines.running.stage import Finished, Outcome, Reads, Settled, Stage, StageContext, Unit
 from pipelines.running.upstream import (
     UpstreamMissing,
     done_outcomes,
@@ -28,7 +28,7 @@ from wsm_data.files.typed_toml import INPUT, SELECTION, build_config
 from wsm_data.schema.codec import CodecInfo
 from wsm_data.schema.identity import EpisodeId
 from wsm_data.shards.assemble import ReleaseFacts, finish_release
-from wsm_data.shards.fragment import SIDECAR_SUFFIX, FragmentInfo, fragment_path, read_fragment_info
+from wsm_data.shards.fragment import FRAGMENT_SUFFIX, SIDECAR_SUFFIX, FragmentInfo, fragment_path, read_fragment_info
 from wsm_data.shards.manifest import ShardInfo
 from wsm_data.shards.names import INDEX_NAME, INVENTORY_NAME, MANIFEST_NAME, QUARANTINE_NAME
 from wsm_data.shards.shard_layout import PlacedClip, ShardLayout, lay_out_shards
@@ -131,6 +131,16 @@ def _require_complete(config: PackConfig) -> None:
         )
 
 
+def _reads(config: PackConfig, units: Sequence[Unit]) -> Reads:
+    """The clips of the shards; their sidecars make the index, whatever is packed."""
+    clips = [outcome for unit in units for outcome in unit.payload.clips.values()]
+    return {config.encode: {one.unit: tuple(out for out in one.outputs if _is_clip(out)) for one in clips}}
+
+
+def _is_clip(output: str) -> bool:
+    return output.endswith(FRAGMENT_SUFFIX)
+
+
 def _process(batch: Sequence[Unit], config: PackConfig, context: StageContext) -> Iterator[Outcome]:
     release = release_folder(context.out)
     for unit in batch:
@@ -208,4 +218,12 @@ def _quality(clips: Mapping[str, Outcome]) -> dict[str, object]:
     return to_json(merged) if merged else {}
 
 
-STAGE = Stage(name="pack", version=1, config_type=PackConfig, list_units=_list_units, process=_process, finish=_finish)
+STAGE = Stage(
+    name="pack",
+    version=1,
+    config_type=PackConfig,
+    list_units=_list_units,
+    process=_process,
+    finish=_finish,
+    reads=_reads,
+)

@@ -35,7 +35,7 @@ def test_every_option_in_the_documentation_exists(page):
     text = (ROOT / page).read_text()
     options = set(re.findall(r"(?<![\w-])--[a-z][a-z-]+", text)) - {"--nproc-per-node"}  # of torchrun
     commands = ("run", "status", "inspect", "film", "verify", "select", "audit", "audit-run", "bench loader")
-    commands += ("export tum",)
+    commands += ("export tum", "clean", "retry")
     commands += ("train", "eval nav", "eval slam", "serve", "source describe", "source miniworld", "check", "preflight")
     commands += ("audit-latents", "eval clips", "dream")
     helped = "".join(CliRunner().invoke(app, [*command.split(), "--help"]).output for command in commands)

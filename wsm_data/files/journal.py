@@ -65,6 +65,11 @@ class JournalWriter:
             raise OSError(errno.ENOSPC, "a record was cut short; is the disk full?", self._file.name)
         self._torn = False
         if self._sync_every_s is not None and time.monotonic() - self._synced_s >= self._sync_every_s:
+            self.sync()
+
+    def sync(self) -> None:
+        """Bring what was appended to disk."""
+        if self._file is not None:
             os.fsync(self._file.fileno())
             self._synced_s = time.monotonic()
 

@@ -26,9 +26,13 @@ ASKED = {
     "--max-refused 0.3": {"max_refused": 0.3},
     "--fork": {"fork": True},
     "--retry-refused": {"retry_refused": True},
+    "--retry-reason frame.empty": {"retry_reasons": ("frame.empty",)},
+    "--reclaim": {"reclaim": True},
     "-q": {"quiet": True},
+    "-v": {"verbose": True},
+    "--log-file /dev/null": {"log_file": Path("/dev/null")},
 }
-REQUESTED = ("out", "config", "assignments", "engine")
+REQUESTED = ("out", "config", "assignments", "engine", "log_file")
 
 
 def request(**changes):

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from pathlib import Path
 
-from pipelines.running.stage import Finished, Outcome, Settled, Stage, StageContext, Unit
+from pipelines.running.stage import Finished, Outcome, Reads, Settled, Stage, StageContext, Unit
 from pipelines.running.upstream import done_outcomes, require_stage
 from wsm_data.errors import DataError, Reason
 from wsm_data.files.atomic import write_bytes, write_text
@@ -133,7 +133,13 @@ def join(batch: Sequence[Unit], config: JoinConfig, context: StageContext) -> It
 
 COPY = Stage(name="copy", version=1, config_type=CopyConfig, list_units=list_copies, process=copy, finish=finish_copies)
 COPY_VERSION_2 = replace(COPY, version=2)
-JOIN = Stage(name="join", version=1, config_type=JoinConfig, list_units=list_joins, process=join)
+
+
+def join_reads(config: JoinConfig, units: Sequence[Unit]) -> Reads:
+    return {config.copy: {unit.id: (f"copies/{unit.id}.txt",) for unit in units}}
+
+
+JOIN = Stage(name="join", version=1, config_type=JoinConfig, list_units=list_joins, process=join, reads=join_reads)
 
 
 class CopyModule:

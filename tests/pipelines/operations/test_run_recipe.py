@@ -41,7 +41,7 @@ def run(tmp_path, source, calls):
 def test_the_stages_of_a_recipe_run_in_order_and_their_table_is_printed(run, tmp_path, capsys):
     run()
     first_words = [line.split()[0] for line in capsys.readouterr().out.splitlines()]
-    assert first_words == ["stage", "copy", "stage", "join"]
+    assert first_words == ["stage", "copy", "join"]
     assert (tmp_path / "run" / "join" / "a1").read_text() == "text of a1!"
 
 
