@@ -11,7 +11,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 from typer.core import TyperGroup
 
-from pipelines.commands import audit, audit_run, bench, inspect, run, serve, settings, source, stages, train
+from pipelines.commands import audit, audit_run, bench, inspect, run, serve, settings, source, stages, stores, train
 from pipelines.commands.clips import export, film
 from pipelines.commands.command import Command, CommandGroup
 from pipelines.commands.evaluating import group as evaluate
@@ -36,6 +36,8 @@ COMMANDS: tuple[Command | CommandGroup, ...] = (
     clean.COMMAND,
     retry.COMMAND,
     settings.COMMAND,
+    stores.PUBLISH_COMMAND,
+    stores.FETCH_COMMAND,
     inspect.COMMAND,
     film.COMMAND,
     export.GROUP,

@@ -1,11 +1,12 @@
-"""`wsm verify` without a folder: every byte is read, and nothing is recorded."""
+"""`wsm verify` without a folder: every byte is read, or none of the shards, and nothing is recorded."""
 
 from dataclasses import fields
 
 import typer
 
 from pipelines.running.options import RunOptions, StageRequest
-from pipelines.stages.verify import require_sound
+from pipelines.stages.verify import require_no_finding, require_sound
+from wsm_data.access.transfer.stored import check_stored
 from wsm_data.errors import ConfigError
 
 
@@ -19,6 +20,25 @@ def verify_without_record(release: str, request: StageRequest) -> None:
     _refuse_unused(request)
     clips = require_sound(release, request.options.quiet)
     typer.echo(f"{release} is whole: {clips} clips, every byte and every trajectory accounted for")
+
+
+def verify_stored(release: str, request: StageRequest) -> None:
+    """Compare what a store says of a release with its manifest, without reading shards.
+
+    Raises:
+        ConfigError: there is no such folder, or an option is given that would do nothing.
+        IntegrityError: lists what is wrong.
+    """
+    _refuse_unused(request)
+    if request.out is not None:
+        raise ConfigError("--no-payload records nothing: leave out --out, or read the shards too")
+    check = check_stored(release)
+    require_no_finding(release, check.findings)
+    by = f"{check.by_checksum} of them by the store's checksum too" if check.by_checksum else "none by a checksum"
+    typer.echo(
+        f"{release} has all {check.shards} shards in their sizes, {by}; index, inventory and quarantine were read. No "
+        "clip was read: `wsm verify` without --no-payload does that"
+    )
 
 
 def _refuse_unused(request: StageRequest) -> None:

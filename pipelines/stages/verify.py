@@ -39,7 +39,7 @@ def require_sound(location: str, quiet: bool = False) -> int:
         IntegrityError: lists what is damaged, by shard and clip.
     """
     clips = _require_sound_shards(location, quiet)
-    _require_sound_attached(location, attached_names(open_store(location)))
+    require_sound_attached(location, attached_names(open_store(location)))
     return clips
 
 
@@ -47,14 +47,19 @@ def _require_sound_shards(location: str, quiet: bool) -> int:
     manifest = read_manifest(open_store(location))
     total = sum(shard.bytes for shard in manifest.shards)
     with tqdm(total=total, unit="B", unit_scale=True, desc="verify", disable=quiet, dynamic_ncols=True) as bar:
-        _require_none(location, verify_release(location, bar.update))
+        require_no_finding(location, verify_release(location, bar.update))
     return manifest.clips
 
 
-def _require_sound_attached(location: str, names: Sequence[str]) -> None:
+def require_sound_attached(location: str, names: Sequence[str]) -> None:
+    """Compare scores and selections with the release that they stand in.
+
+    Raises:
+        IntegrityError: lists what is damaged.
+    """
     if names:
         release = open_release(location)
-        _require_none(location, [found for name in names for found in check_attached(release, name)])
+        require_no_finding(location, [found for name in names for found in check_attached(release, name)])
 
 
 def _list_units(config: VerifyConfig) -> Sequence[Unit]:
@@ -81,14 +86,19 @@ def _process(batch: Sequence[Unit], config: VerifyConfig, context: StageContext)
     del context
     for unit in batch:
         if unit.payload:
-            _require_sound_attached(config.release, [unit.payload])
+            require_sound_attached(config.release, [unit.payload])
             yield Outcome(unit=unit.id, digest=unit.inputs["content"], facts={"findings": 0})
         else:
             clips = _require_sound_shards(config.release, quiet=True)
             yield Outcome(unit=unit.id, digest=unit.inputs["manifest"], facts={"clips": clips, "findings": 0})
 
 
-def _require_none(location: str, findings: Sequence[Finding]) -> None:
+def require_no_finding(location: str, findings: Sequence[Finding]) -> None:
+    """Refuse a release of which something was found.
+
+    Raises:
+        IntegrityError: lists the findings.
+    """
     if findings:
         raise IntegrityError(_message(location, findings))
 

@@ -29,7 +29,16 @@ def test_every_stage_is_in_the_tour():
 
 
 @pytest.mark.parametrize(
-    "page", [*PAGES, "docs/loaders.md", "docs/closed_loop.md", "docs/sources.md", "docs/soundness.md", "docs/model.md"]
+    "page",
+    [
+        *PAGES,
+        "docs/loaders.md",
+        "docs/closed_loop.md",
+        "docs/sources.md",
+        "docs/soundness.md",
+        "docs/model.md",
+        "docs/stores.md",
+    ],
 )
 def test_every_option_in_the_documentation_exists(page):
     text = (ROOT / page).read_text()
@@ -37,6 +46,7 @@ def test_every_option_in_the_documentation_exists(page):
     commands = ("run", "status", "inspect", "film", "verify", "select", "audit", "audit-run", "bench loader")
     commands += ("export tum", "clean", "retry")
     commands += ("train", "eval nav", "eval slam", "serve", "source describe", "source miniworld", "check", "preflight")
+    commands += ("publish", "fetch")
     commands += ("audit-latents", "eval clips", "dream")
     helped = "".join(CliRunner().invoke(app, [*command.split(), "--help"]).output for command in commands)
     assert options - {one for one in options if one in helped} == set()

@@ -41,17 +41,22 @@ def verify_release(location: str | Path, on_progress: Callable[[int], None] | No
     return list(_findings(store, manifest, on_progress or _ignore))
 
 
-def _findings(store: Store, manifest: ReleaseManifest, on_progress: Callable[[int], None]) -> Iterator[Finding]:
-    faults: list[Finding] = []
-    index = _load(store, INDEX_NAME, manifest.index_sha256, parse_index, faults)
-    inventory = _load(store, INVENTORY_NAME, manifest.inventory_sha256, parse_inventory, faults)
-    quarantine = _load(store, QUARANTINE_NAME, manifest.quarantine_sha256, parse_quarantine, faults)
-    yield from faults
+def check_beside_shards(store: Store, manifest: ReleaseManifest) -> tuple[IndexTable | None, list[Finding]]:
+    """The index, as far as it can be read, and what is wrong beside the shards, none of which is read."""
+    found: list[Finding] = []
+    index = _load(store, INDEX_NAME, manifest.index_sha256, parse_index, found)
+    inventory = _load(store, INVENTORY_NAME, manifest.inventory_sha256, parse_inventory, found)
+    quarantine = _load(store, QUARANTINE_NAME, manifest.quarantine_sha256, parse_quarantine, found)
     if index is not None and inventory is not None:
-        yield from check_counts(manifest, index, inventory)
+        found += check_counts(manifest, index, inventory)
         if quarantine is not None:
-            yield from check_conservation(manifest, index, inventory, quarantine)
-    yield from _unlisted(store, manifest)
+            found += check_conservation(manifest, index, inventory, quarantine)
+    return index, [*found, *_unlisted(store, manifest)]
+
+
+def _findings(store: Store, manifest: ReleaseManifest, on_progress: Callable[[int], None]) -> Iterator[Finding]:
+    index, beside = check_beside_shards(store, manifest)
+    yield from beside
     for shard in manifest.shards:
         rows_faults: list[Finding] = []
         rows = _rows(index, shard, rows_faults)

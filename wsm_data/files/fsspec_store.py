@@ -6,6 +6,7 @@ import os
 import threading
 from collections.abc import Callable
 from concurrent.futures import CancelledError, Future
+from pathlib import Path
 from typing import Any
 
 import fsspec
@@ -76,6 +77,33 @@ class FsspecStore:
                 raise
             return b""  # some stores refuse a range that starts behind the end
 
+    def put_file(self, name: str, path: Path) -> None:
+        """Upload a file of this machine, replacing what was there."""
+        there = f"{self._base}/{name}"
+        self._ask(lambda: self._call("put_file", str(path), there, size_bytes=path.stat().st_size), name)
+
+    def call(self, method: str, name: str) -> Any:
+        """What a method of fsspec's file system says of a file, or does with it."""
+        return self._ask(lambda: self._call(method, f"{self._base}/{name}"), name)
+
+    def call_s3(self, operation: str, name: str, *, size_bytes: int = 0, **arguments: object) -> Any:
+        """Call an operation of S3 by its name in boto3, in the bucket of this folder.
+
+        Args:
+            operation: such as `create_multipart_upload`.
+            name: the file that it is about, for messages.
+            size_bytes: bytes that are sent, by which the time limit grows.
+            **arguments: of the operation, without `Bucket`.
+        """
+        bucket = self._base.partition("/")[0]
+        return self._ask(
+            lambda: self._call("call_s3", operation, size_bytes=size_bytes, Bucket=bucket, **arguments), name
+        )
+
+    def s3_key(self, name: str) -> str:
+        """What S3 calls a file in the bucket of this folder."""
+        return f"{self._base}/{name}".partition("/")[2]
+
     def close(self) -> None:
         """Give up what is being asked, in whatever thread: whoever waits for it gets a StoreError."""
         self._closed.set()
@@ -121,7 +149,7 @@ class FsspecStore:
     def _info(self, name: str) -> dict[str, Any]:
         return self._ask(lambda: self._call("info", f"{self._base}/{name}"), name)
 
-    def _call(self, method: str, path: str, size_bytes: int = 0, **arguments: object) -> Any:
+    def _call(self, method: str, *paths: str, size_bytes: int = 0, **arguments: object) -> Any:
         """Call a method of the file system, within the time that this many bytes may take."""
         if self._process != os.getpid():
             self._connect()
@@ -129,9 +157,9 @@ class FsspecStore:
             raise self._is_closed()
         filesystem = self._filesystem
         if not filesystem.async_impl:
-            return getattr(filesystem, method)(path, **arguments)
+            return getattr(filesystem, method)(*paths, **arguments)
         timeout_s = self.request.timeout_s * max(1, -(-size_bytes // _TIMED_BYTES))
-        answer = asyncio.wait_for(getattr(filesystem, f"_{method}")(path, **arguments), timeout_s)
+        answer = asyncio.wait_for(getattr(filesystem, f"_{method}")(*paths, **arguments), timeout_s)
         future = asyncio.run_coroutine_threadsafe(answer, filesystem.loop)
         self._in_flight.add(future)
         if self._closed.is_set():  # since it was looked at above
@@ -155,6 +183,8 @@ def _own_filesystem(root: str, request: RequestConfig) -> tuple[Any, str]:
         settings = fsspec.config.conf.get("s3", {}).get("config_kwargs", {})
         limits = {"retries": {"total_max_attempts": 1}, "max_pool_connections": request.connections}
         options["config_kwargs"] = {**settings, **limits}
+    if root.startswith("file://"):
+        options["auto_mkdir"] = True  # of what is uploaded; other stores have no folders, or make them
     try:
         filesystem, path = fsspec.core.url_to_fs(root, **options)
     except (ImportError, ValueError) as error:

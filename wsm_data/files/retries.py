@@ -38,14 +38,18 @@ _FAILURES_OF_LIBRARIES = {
     "aiohttp": ("ClientError",),
     "botocore.exceptions": ("BotoCoreError", "ClientError"),
     "botocore.parsers": ("ResponseParserError",),
+    "httpx": ("HTTPError",),
+    "httpx2": ("HTTPError",),
 }
 _PASSING_FAILURES_OF_LIBRARIES = {
     "aiohttp": ("ClientError",),
     "botocore.exceptions": ("HTTPClientError", "ConnectionError", "IncompleteReadError", "FlexibleChecksumError"),
     "botocore.parsers": ("ResponseParserError",),
+    "httpx": ("HTTPError",),
+    "httpx2": ("HTTPError",),
 }
-"""What s3fs and fsspec's HTTP file system let through beside OSError: s3fs translates the answers of a store to it, but
-not the failures of a connection."""
+"""What s3fs, fsspec's HTTP file system and the client of the Hugging Face Hub let through beside OSError: s3fs
+translates the answers of a store to it, but not the failures of a connection."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,7 +123,8 @@ def backoff_s(attempt: int, config: RequestConfig) -> float:
 
 def may_pass(error: BaseException) -> bool:
     """Whether the same request may succeed later."""
-    status = getattr(error, "status", None)  # of aiohttp, where a server answered
+    answer = getattr(error, "response", None)  # of httpx
+    status = getattr(error, "status", None) or getattr(answer, "status_code", None)  # where a server answered
     if isinstance(status, int) and 400 <= status < 500:
         return status in _PASSING_STATUSES
     if isinstance(error, _failures(_PASSING_FAILURES_OF_LIBRARIES)):

@@ -7,9 +7,9 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from pipelines.commands import run, select
+from pipelines.commands import run, select, verify
 from pipelines.commands.stage_options import filling, reading
-from pipelines.operations import run_recipe
+from pipelines.operations import run_recipe, run_stage
 from pipelines.operations import select as selecting
 from pipelines.running.engines.choice import EngineName
 from pipelines.running.options import RunOptions, StageRequest
@@ -41,17 +41,19 @@ def request(**changes):
     return StageRequest(**of_request, options=replace(RunOptions(workers=0), **options))
 
 
-@pytest.fixture(params=["filling", "reading", "run", "select"])
+@pytest.fixture(params=["filling", "reading", "run", "select", "verify"])
 def ask(request, monkeypatch):
     """Types words after one of the kinds of commands; returns what it was asked for."""
     seen = []
     monkeypatch.setattr(run_recipe, "run_recipe", lambda recipe, asked: seen.append(asked))
+    monkeypatch.setattr(run_stage, "run_one", lambda name, asked, release: seen.append(asked))
     monkeypatch.setattr(selecting, "run_select", lambda release, asked, **own: seen.append(asked))
     calls = {
         "filling": (filling(lambda request: seen.append(request)), []),
         "reading": (reading(lambda release, request: seen.append(request)), ["release"]),
         "run": (run.RUN_COMMAND.call, ["demo"]),
         "select": (select.COMMAND.call, ["release"]),
+        "verify": (verify.COMMAND.call, ["release"]),
     }
     call, arguments = calls[request.param]
     app = typer.Typer()

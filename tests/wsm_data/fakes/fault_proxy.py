@@ -1,7 +1,7 @@
 """An HTTP proxy in front of an object store, which spoils the answers it is told to spoil.
 
-Faults are planned by the path of the object: the next `times` requests whose path and query match get the fault, all
-others pass unchanged. Everything that passed by is recorded.
+Faults are planned by method and path of the object: the next `times` requests whose method, path and query match get
+the fault, all others pass unchanged. Everything that passed by is recorded.
 """
 
 import http.client
@@ -46,6 +46,7 @@ class Plan:
     pattern: str
     fault: Fault
     times: int
+    method: str = "GET"
     seen: int = 0
 
 
@@ -66,6 +67,7 @@ class FaultProxy:
         self.passed: list[Passed] = []
         self.on_request: Callable[[str], None] | None = None
         self._plans: list[Plan] = []
+        self._every = 0
         self._lock = threading.Lock()
         self._upstream = upstream
         self._closing = threading.Event()
@@ -87,10 +89,14 @@ class FaultProxy:
     def url(self) -> str:
         return f"http://127.0.0.1:{self._server.server_address[1]}"
 
-    def spoil(self, pattern: str, fault: Fault, times: int = 1) -> None:
-        """The next `times` GET requests whose path and query match `pattern` get `fault`."""
+    def spoil(self, pattern: str, fault: Fault, times: int = 1, method: str = "GET") -> None:
+        """The next `times` requests of a method whose path and query match `pattern` get `fault`."""
         with self._lock:
-            self._plans.append(Plan(pattern, fault, times))
+            self._plans.append(Plan(pattern, fault, times, method))
+
+    def fail_every(self, number: int) -> None:
+        """Every request of this number (the fifth, the tenth, ...) gets a 503; 0: none."""
+        self._every = number
 
     def requests(self, pattern: str = "") -> list[Passed]:
         with self._lock:
@@ -104,11 +110,11 @@ class FaultProxy:
         if self.on_request is not None:
             self.on_request(path)
         with self._lock:
-            plan = next(
-                (plan for plan in self._plans if plan.times > plan.seen and re.search(plan.pattern, path)), None
-            )
-            fault = plan.fault if plan is not None and method == "GET" else None
-            if plan is not None and fault is not None:
+            fits = (one for one in self._plans if one.method == method and one.times > one.seen)
+            plan = next((one for one in fits if re.search(one.pattern, path)), None)
+            is_due = self._every and len(self.passed) % self._every == self._every - 1
+            fault = plan.fault if plan is not None else Fault.SLOW_DOWN if is_due else None
+            if plan is not None:
                 plan.seen += 1
             self.passed.append(Passed(method, path, byte_range, fault))
             return fault

@@ -1,8 +1,10 @@
 """A release in a local S3 (moto as a server) behind the fault proxy; all listen on free ports of the loopback."""
 
+import uuid
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 from fault_proxy import FaultProxy
@@ -83,27 +85,29 @@ def published(store_server: tuple[str, int], tmp_path_factory: pytest.TempPathFa
 
 def upload(folder: Path, server: tuple[str, int], prefix: str = "tiny") -> None:
     """Put all files of a folder into the bucket."""
-    import boto3
-
-    host, port = server
-    client = boto3.client(
-        "s3",
-        endpoint_url=f"http://{host}:{port}",
-        region_name="us-east-1",
-        aws_access_key_id="test",
-        aws_secret_access_key="test",  # noqa: S106 - moto asks for one and checks none
-    )
+    client = _client(server)
     client.create_bucket(Bucket=BUCKET)
     for path in sorted(folder.iterdir()):
         client.upload_file(str(path), BUCKET, f"{prefix}/{path.name}")
     client.close()
 
 
+def _client(server: tuple[str, int]) -> Any:
+    import boto3
+
+    host, port = server
+    return boto3.client(
+        "s3",
+        endpoint_url=f"http://{host}:{port}",
+        region_name="us-east-1",
+        aws_access_key_id="test",
+        aws_secret_access_key="test",  # noqa: S106 - moto asks for one and checks none
+    )
+
+
 @pytest.fixture
-def remote(
-    published: Published, store_server: tuple[str, int], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> Iterator[Remote]:
-    """The published release, reached as users reach theirs: endpoint and keys stand in the environment."""
+def store_proxy(store_server: tuple[str, int], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[FaultProxy]:
+    """The object store through a proxy of this test alone, reached as users reach theirs: by the environment."""
     with FaultProxy(store_server) as proxy:
         monkeypatch.setenv("AWS_ENDPOINT_URL", proxy.url)
         monkeypatch.setenv("AWS_ACCESS_KEY_ID", "test")
@@ -112,7 +116,23 @@ def remote(
         monkeypatch.setenv("AWS_CONFIG_FILE", str(tmp_path / "absent"))
         monkeypatch.setenv("AWS_SHARED_CREDENTIALS_FILE", str(tmp_path / "absent"))
         monkeypatch.setenv("AWS_EC2_METADATA_DISABLED", "true")
-        yield Remote(published, proxy)
+        yield proxy
+
+
+@pytest.fixture
+def bucket(store_proxy: FaultProxy, store_server: tuple[str, int]) -> Iterator[tuple[str, Any]]:
+    """URL of an empty bucket behind the proxy, and a client of boto3 that reaches it without."""
+    client = _client(store_server)
+    name = f"empty-{uuid.uuid4().hex[:12]}"
+    client.create_bucket(Bucket=name)
+    yield f"s3://{name}", client
+    client.close()
+
+
+@pytest.fixture
+def remote(published: Published, store_proxy: FaultProxy) -> Remote:
+    """The published release."""
+    return Remote(published, store_proxy)
 
 
 @pytest.fixture(params=["http", pytest.param("s3", marks=pytest.mark.slow)])
