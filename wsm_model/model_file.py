@@ -18,6 +18,7 @@ from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.files.atomic import write_text
 from wsm_data.files.digest import sha256_file
 from wsm_data.files.typed_toml import build_config
+from wsm_data.schema.depth import DepthRange
 from wsm_data.schema.latent_standard import LatentStandard
 from wsm_model.config import ModelConfig
 from wsm_model.model import WorldSlamModel
@@ -38,6 +39,7 @@ class ModelCard:
         releases: digests of the releases it was trained on.
         steps: optimiser steps.
         weights_sha256: digest of the weights' file.
+        depth_range: what its depth latents stand for; None in files that do not say.
     """
 
     config: ModelConfig
@@ -45,6 +47,7 @@ class ModelCard:
     releases: tuple[str, ...]
     steps: int
     weights_sha256: str = ""
+    depth_range: DepthRange | None = None
 
 
 def save_model(folder: Path, model: WorldSlamModel, card: ModelCard) -> None:
@@ -63,8 +66,17 @@ def save_model(folder: Path, model: WorldSlamModel, card: ModelCard) -> None:
         (folder / CARD_FILE).unlink(missing_ok=True)
         save_file(tensors, folder / WEIGHTS_FILE)
         record = asdict(card) | {"weights_sha256": sha256_file(folder / WEIGHTS_FILE)}
-        write_text(folder / CARD_FILE, json.dumps(record, indent=2, sort_keys=True) + "\n")
+        _write_card(folder, record)
     wait_for_all()
+
+
+def save_card(folder: Path, card: ModelCard) -> None:
+    """Write what the weights in a folder, such as those of checkpoints, are."""
+    _write_card(folder, asdict(card))
+
+
+def _write_card(folder: Path, record: Mapping[str, object]) -> None:
+    write_text(folder / CARD_FILE, json.dumps(record, indent=2, sort_keys=True) + "\n")
 
 
 def load_card(folder: Path) -> ModelCard:
@@ -100,14 +112,24 @@ def load_model(
     card = load_card(folder)
     if standard is not None:
         require_standard(card, standard)
+    require_weights(folder, card)
     path = folder / WEIGHTS_FILE
-    found = sha256_file(path) if path.is_file() else "no file"
-    if found != card.weights_sha256:
-        raise IntegrityError(f"{path} must have sha256 {card.weights_sha256}, found {found}; restore the file")
     with torch.device("meta"):
         model = WorldSlamModel(card.config)
     _fill(model, path, precision)
     return model.eval(), card
+
+
+def require_weights(folder: Path, card: ModelCard) -> None:
+    """Check that the weights of a model are those of its card.
+
+    Raises:
+        IntegrityError: they are not.
+    """
+    path = folder / WEIGHTS_FILE
+    found = sha256_file(path) if path.is_file() else "no file"
+    if found != card.weights_sha256:
+        raise IntegrityError(f"{path} must have sha256 {card.weights_sha256}, found {found}; restore the file")
 
 
 def require_standard(card: ModelCard, standard: LatentStandard) -> None:

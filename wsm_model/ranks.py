@@ -9,10 +9,11 @@ from contextlib import contextmanager
 
 import torch
 import torch.distributed as dist
-from torch import Tensor
+from torch import Tensor, nn
 from torch.distributed.device_mesh import init_device_mesh
 from torch.distributed.fsdp import FSDPModule, fully_shard
 
+from wsm_model.model import WorldSlamModel
 from wsm_model.mot.transformer import MixtureOfTransformers
 
 
@@ -44,15 +45,26 @@ def shard_model(model: MixtureOfTransformers, device: torch.device) -> None:
 
 
 @contextmanager
-def unsharded(model: MixtureOfTransformers) -> Iterator[None]:
-    """Hold what is outside of the layers in whole on every rank, for passes that do not begin with `forward`."""
-    if isinstance(model, FSDPModule):
-        model.unshard()
-    try:
-        yield
-    finally:
-        if isinstance(model, FSDPModule):
-            model.reshard()
+def whole_model(model: WorldSlamModel) -> Iterator[WorldSlamModel]:
+    """The model in evaluation mode with all its weights on every rank, for passes that ranks take by themselves.
+
+    A sharded model is gathered once, tensor by tensor, into another of its kind; one that is alone is lent as it is.
+    """
+    if not _is_sharded(model):
+        was_training = model.training
+        try:
+            yield model.eval()
+        finally:
+            model.train(was_training)
+        return
+    with torch.device("meta"):
+        copied = WorldSlamModel(model.config, model.attention)
+    copied.load_state_dict({name: whole(one.detach()) for name, one in model.named_parameters()}, assign=True)
+    yield copied.eval()
+
+
+def _is_sharded(model: nn.Module) -> bool:
+    return isinstance(model, FSDPModule)
 
 
 def sum_over_ranks(values: Iterable[float], device: torch.device) -> list[float]:
@@ -63,12 +75,36 @@ def sum_over_ranks(values: Iterable[float], device: torch.device) -> list[float]
     return [float(value) for value in total.tolist()]
 
 
+def gather_text(text: str) -> list[str]:
+    """What every rank says, in the order of the ranks; each gets the same."""
+    if not dist.is_initialized():
+        return [text]
+    device = collective_device()
+    own = torch.tensor(list(text.encode()), dtype=torch.uint8, device=device)
+    sizes = [torch.zeros(1, dtype=torch.int64, device=device) for _ in range(dist.get_world_size())]
+    dist.all_gather(sizes, torch.tensor([len(own)], device=device))
+    longest = max(int(size) for size in sizes)
+    padded = [torch.zeros(longest, dtype=torch.uint8, device=device) for _ in sizes]
+    dist.all_gather(padded, torch.nn.functional.pad(own, (0, longest - len(own))))
+    return [bytes(part[: int(size)].tolist()).decode() for part, size in zip(padded, sizes, strict=True)]
+
+
+def collective_device() -> torch.device:
+    """Where tensors must lie to be exchanged among ranks."""
+    return torch.device("cuda", torch.cuda.current_device()) if dist.get_backend() == "nccl" else torch.device("cpu")
+
+
 def any_rank(here: bool) -> bool:
     """Whether something holds on any rank; every rank gets the same answer."""
     if not dist.is_initialized():
         return here
-    device = torch.device("cuda", torch.cuda.current_device()) if dist.get_backend() == "nccl" else torch.device("cpu")
-    return sum_over_ranks([float(here)], device)[0] > 0
+    return sum_over_ranks([float(here)], collective_device())[0] > 0
+
+
+def own_part(tensor: Tensor) -> Tensor:
+    """What this rank keeps of a tensor; all of it where it is not sharded."""
+    part = getattr(tensor, "to_local", None)
+    return tensor if part is None else part()
 
 
 def whole(tensor: Tensor) -> Tensor:

@@ -22,6 +22,10 @@ def train(
     assignments: Annotated[
         list[str] | None, typer.Option("--set", "-s", help="One setting: section.key=value. Repeatable.")
     ] = None,
+    init: Annotated[
+        Path | None,
+        typer.Option("--init", help="Start from these weights: a model's folder, a run's, or that of a checkpoint."),
+    ] = None,
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Show settings, and memory, time and sizes by calculation; write nothing.")
     ] = False,
@@ -32,7 +36,7 @@ def train(
     require_extra("train", ("safetensors", "tensorboard"))
     from pipelines.operations import train as operation
 
-    operation.train(release, out, config, assignments or [], dry_run, anyway, quiet)
+    operation.train(release, out, config, assignments or [], init, dry_run, anyway, quiet)
 
 
 COMMAND = Command(

@@ -27,6 +27,7 @@ def train(
     out: Path,
     config: Path | None,
     assignments: Sequence[str],
+    init: Path | None,
     dry_run: bool,
     anyway: bool,
     quiet: bool,
@@ -38,6 +39,7 @@ def train(
         out: folder of the run.
         config: TOML file of differences to the defaults.
         assignments: `key=value` words.
+        init: folder of weights to start from.
         dry_run: show settings, sizes and what the run would take; write nothing.
         anyway: of a dry run, do not refuse what cannot fit into memory.
         quiet: no progress bars.
@@ -45,7 +47,7 @@ def train(
     Raises:
         ConfigError: a setting is wrong or missing, sources are named twice, or memory is too small by calculation.
     """
-    built = train_config(release, config, assignments)
+    built = train_config(release, config, assignments, init)
     if dry_run:
         typer.echo(json.dumps(config_json(built), indent=1))
         describe(built, anyway)
@@ -57,13 +59,17 @@ def train(
         typer.echo(f"model: {out / 'model'}\ncurves: {out / 'curves.png'}")
 
 
-def train_config(release: str | None, config: Path | None, assignments: Sequence[str]) -> TrainRunConfig:
+def train_config(
+    release: str | None, config: Path | None, assignments: Sequence[str], init: Path | None
+) -> TrainRunConfig:
     """Settings of a run.
 
     Raises:
         ConfigError: a setting is wrong or missing, or sources are named twice.
     """
     values = merge(load_toml(recipe_path(config)) if config else {}, parse_assignments(assignments))
+    if init is not None:
+        values = merge(values, {"model": {"init": str(init)}})
     if release and "sources" in values:
         raise ConfigError("the sources are named twice: leave RELEASE out, or `sources` out of the settings")
     if release:

@@ -19,6 +19,7 @@ class ModelChoice:
         variant: `slam`, or `idm` for the ablation without SLAM.
         prediction: `velocity` or `clean`: what the RGB head says of noisy latents; `none`: that of the size.
         weights: folder of the transformer of Wan2.2-TI2V-5B to start from; empty: from random weights.
+        init: folder of a model of this project, of a run, or of a checkpoint, whose weights are started from.
         attention: how the joint attention is evaluated: `auto`, `flex`, `blocks` or `dense`.
     """
 
@@ -26,7 +27,12 @@ class ModelChoice:
     variant: Variant = Variant.SLAM
     prediction: Prediction | None = None
     weights: str = ""
+    init: str = ""
     attention: Attention = Attention.AUTO
+
+    def __post_init__(self) -> None:
+        if self.weights and self.init:
+            raise ValueError("a run starts from `weights` or from `init`, not from both: leave one of them empty")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,6 +12,7 @@ from wsm_data.loaders.batches.batch import Batch
 from wsm_data.loaders.config import Arrangement, LoaderConfig, OrderConfig, ReadConfig, Remainder, SourceConfig
 from wsm_data.loaders.loader import ClipLoader
 from wsm_data.loaders.sources.clips import Sources, SourceTable
+from wsm_data.schema.latent_standard import LatentStandard
 from wsm_data.shards.latent_standard import latent_standard
 from wsm_data.shards.manifest import ReleaseManifest
 from wsm_data.shards.release_codec import codec_of
@@ -54,23 +55,27 @@ def held_out_loader(config: TrainRunConfig, device: torch.device) -> ClipLoader 
     if not manifest.clips_by_split.get(held_out.split):
         _LOG.warning("release %s has no clips of the split %r: nothing is held out", manifest.name, held_out.split)
         return None
-    return clips_loader(source.release, held_out, device, depth=needs_depth(config))
+    return clips_loader(source.release, held_out, device, depth=needs_depth(config), standard=config.read.standard)
 
 
 def clips_loader(
-    release: str, held_out: HeldOutConfig, device: torch.device, *, depth: bool, seed: int = 0
+    release: str,
+    held_out: HeldOutConfig,
+    device: torch.device,
+    *,
+    depth: bool,
+    seed: int = 0,
+    standard: LatentStandard | None = None,
 ) -> ClipLoader:
-    """Clips of a release's split, one by one, in an order of the seed alone.
+    """Clips of a release's split, one by one, in an order of the seed alone, by their own standard if none is given.
 
     Raises:
         ConfigError: there is no such release or split, or a clip has no depth though it is asked for.
         IntegrityError: the release is damaged.
     """
-    return ClipLoader(
-        _one_by_one(SourceConfig(release=release, split=held_out.split), held_out, device, depth=depth, seed=seed),
-        rank=0,
-        world_size=1,
-    )
+    source = SourceConfig(release=release, split=held_out.split)
+    settings = _one_by_one(source, held_out, device, depth=depth, seed=seed, standard=standard)
+    return ClipLoader(settings, rank=0, world_size=1)
 
 
 def clip_batch(release: Release, key: str, held_out: HeldOutConfig, device: torch.device, *, depth: bool) -> Batch:
@@ -89,7 +94,13 @@ def clip_batch(release: Release, key: str, held_out: HeldOutConfig, device: torc
 
 
 def _one_by_one(
-    source: SourceConfig, held_out: HeldOutConfig, device: torch.device, *, depth: bool, seed: int
+    source: SourceConfig,
+    held_out: HeldOutConfig,
+    device: torch.device,
+    *,
+    depth: bool,
+    seed: int,
+    standard: LatentStandard | None = None,
 ) -> LoaderConfig:
     order = OrderConfig(
         seed=seed,
@@ -100,19 +111,19 @@ def _one_by_one(
         max_latents=held_out.max_latents,
         chunk_sizes=(held_out.session.chunk_size,),
     )
-    read = ReadConfig(device=str(device), threads=1, prefetch_batches=1)
+    read = ReadConfig(device=str(device), threads=1, prefetch_batches=1, standard=standard)
     return LoaderConfig(sources=(source,), order=order, read=read, depth=depth)
 
 
-def decoding_of(manifest: ReleaseManifest, codec_weights: str) -> Decoding:
-    """What turns latents of a release into pictures.
+def decoding_of(manifest: ReleaseManifest, codec_weights: str, standard: LatentStandard | None = None) -> Decoding:
+    """What turns latents of a release into pictures; they are standardised by its own standard if none is given.
 
     Raises:
         ConfigError: the codec cannot be built, or these are not its weights.
     """
     return Decoding(
         codec=codec_of(manifest, codec_weights),
-        standard=latent_standard(manifest),
+        standard=standard or latent_standard(manifest),
         depth_range=manifest.depth_range,
     )
 

@@ -12,6 +12,7 @@ from tqdm import tqdm
 
 from pipelines.training.config import HeldOutConfig
 from wsm_data.files.atomic import write_text
+from wsm_data.files.typed_toml import build_config
 from wsm_data.loaders.batches.batch import Batch
 from wsm_data.loaders.loader import ClipLoader
 from wsm_data.view.drawing.text_table import aligned
@@ -22,6 +23,7 @@ from wsm_model.evaluation.held_out import ClipErrors, HeldOutSettings, clip_erro
 from wsm_model.evaluation.summary import summarise
 from wsm_model.inference.sampler import flow_schedule
 from wsm_model.model import WorldSlamModel
+from wsm_model.ranks import gather_text, rank_and_world_size
 
 _LOG = logging.getLogger(__name__)
 
@@ -38,7 +40,8 @@ def evaluate(
 ) -> str:
     """Measure a model on held-out clips, write the numbers to `path`, and return a table of their means.
 
-    Without SLAM a model estimates no state of what it sees: there are its dreams and the flow-matching loss alone.
+    Ranks share the clips; the first writes, and the others return an empty table. Without SLAM a model estimates no
+    state of what it sees: there are its dreams and the flow-matching loss alone.
 
     Args:
         model: in evaluation mode.
@@ -54,6 +57,9 @@ def evaluate(
         _LOG.warning("%d held-out clips were asked for, the split %s has %d", config.clips, config.split, clips)
     batches = list(islice(loader, clips))
     errors = held_out_errors(model, batches, config, decoding=decoding, shift=shift, quiet=quiet)
+    rank, _ = rank_and_world_size()
+    if rank:
+        return ""
     means, flow = summarise(errors), flow_matching_errors(model, batches, seed=0, shift=shift)
     record = {**means, "flow": dataclasses.asdict(flow), "clips": [dataclasses.asdict(one) for one in errors]}
     write_text(path, json.dumps(record, indent=1) + "\n")
@@ -69,17 +75,28 @@ def held_out_errors(
     shift: float,
     quiet: bool,
 ) -> list[ClipErrors]:
-    """Errors of a model on clips, beside guesses that are fitted to those clips; arguments as in `evaluate`."""
+    """Errors of a model on clips, beside guesses that are fitted to those clips; arguments as in `evaluate`.
+
+    Each rank takes every n-th clip, with a whole model of its own; all return the errors of all.
+    """
     settings = HeldOutSettings(
         session=config.session,
         schedule=flow_schedule(config.flow_steps, shift),
         decoding=decoding,
         baselines=fit_baselines(batches, decoding, config.session.chunk_size),
     )
-    errors: list[ClipErrors] = []
-    for batch in tqdm(batches, unit="clip", desc="evaluate", disable=quiet):
-        errors += clip_errors(model, batch, settings)
-    return errors
+    rank, world_size = rank_and_world_size()
+    found: list[tuple[int, ClipErrors]] = []
+    for number in tqdm(range(rank, len(batches), world_size), unit="clip", desc="evaluate", disable=quiet):
+        found += [(number, one) for one in clip_errors(model, batches[number], settings)]
+    return found_by_all(found)
+
+
+def found_by_all(found: Sequence[tuple[int, ClipErrors]]) -> list[ClipErrors]:
+    """Errors that the ranks found, each with the number of its batch, in the order of those numbers."""
+    own = json.dumps([[number, dataclasses.asdict(one)] for number, one in found])
+    everyone = [pair for text in gather_text(own) for pair in json.loads(text)]
+    return [build_config(ClipErrors, record) for _, record in sorted(everyone, key=lambda pair: int(pair[0]))]
 
 
 def curve_values(means: Mapping[str, object]) -> dict[str, float]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from wsm_data.access.config import AccessConfig
+from wsm_data.schema.latent_standard import LatentStandard
 
 MAX_CHUNK_LATENTS = 4
 """Largest chunk size K (paper, implementation details: K is drawn from 1 to 4)."""
@@ -121,6 +122,7 @@ class ReadConfig(AccessConfig):
         threads: threads that read ahead in the training process; 0: everything in the caller's thread.
         prefetch_batches: batches that are read ahead.
         standardise: subtract mean and divide by standard deviation; otherwise latents come as they are stored.
+        standard: by which numbers; none: the standard of the first release. A model goes on learning by its own.
         dtype: dtype of the latents of a batch: `float32`, `bfloat16`, or `float16`.
         device: where batches are delivered, as torch spells it.
         pin_memory: read into page-locked memory, so that the transfer to a GPU runs beside the training step.
@@ -130,6 +132,7 @@ class ReadConfig(AccessConfig):
     threads: int = 2
     prefetch_batches: int = 2
     standardise: bool = True
+    standard: LatentStandard | None = None
     dtype: str = "float32"
     device: str = "cpu"
     pin_memory: bool = False

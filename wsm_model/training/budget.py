@@ -9,19 +9,18 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 
-import numpy as np
 import torch
 from torch import Tensor
 from torch._subclasses.fake_tensor import FakeTensorMode
 from torch.nn.functional import scaled_dot_product_attention
 from torch.utils.flop_counter import FlopCounterMode
 
-from wsm_data.schema.sequence import SequenceSpan, chunk_numbers
+from wsm_data.schema.sequence import SequenceSpan, chunk_bounds
 from wsm_model.config import Expert, ModelConfig
 from wsm_model.inputs import ModelInputs
 from wsm_model.model import WorldSlamModel
 from wsm_model.mot.attention import Attended, JointTokens, flatten_tokens, unflatten_tokens
-from wsm_model.mot.mask import RULES, TokenKind, allowed
+from wsm_model.mot.mask import RULES, Rule, TokenKind
 from wsm_model.precision import Precision, autocast, matrices
 
 _TRACED_LATENTS = 4
@@ -154,16 +153,22 @@ def step_flop(config: ModelConfig, cost: ModelCost, lengths: Mapping[int, float]
 
 def attended_pairs(config: ModelConfig, latents: int) -> float:
     """Pairs of tokens that the mask allows in a sequence, the mean over the chunk sizes 1 to 4."""
-    latent = torch.arange(latents)
-    total = 0
-    for size in _CHUNK_SIZES:
-        chunk = torch.from_numpy(chunk_numbers(np.arange(latents), size))
-        for (query, key), rule in RULES[config.variant].items():
-            frames = allowed(
-                torch.tensor(int(rule)), latent=(latent[:, None], latent), chunk=(chunk[:, None], chunk)
-            ).sum()
-            total += int(frames) * _tokens(config, query) * _tokens(config, key)
-    return total / len(_CHUNK_SIZES)
+    return sum(pairs_of_sequence(config, latents, size) for size in _CHUNK_SIZES) / len(_CHUNK_SIZES)
+
+
+def pairs_of_sequence(config: ModelConfig, latents: int, chunk_size: int) -> int:
+    """Pairs of tokens that the mask allows in a sequence: of frames by each rule, times the tokens of both."""
+    bounds = chunk_bounds(latents, chunk_size)
+    frames = {
+        Rule.UP_TO_OWN_LATENT: latents * (latents + 1) // 2,
+        Rule.EARLIER_CHUNKS: sum((end - first) * first for first, end in bounds),
+        Rule.UP_TO_OWN_CHUNK: sum((end - first) * end for first, end in bounds),
+        Rule.OWN_CHUNK: sum((end - first) ** 2 for first, end in bounds),
+    }
+    return sum(
+        frames[rule] * _tokens(config, query) * _tokens(config, key)
+        for (query, key), rule in RULES[config.variant].items()
+    )
 
 
 def _tokens(config: ModelConfig, kind: TokenKind) -> int:

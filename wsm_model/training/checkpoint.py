@@ -14,8 +14,10 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 
 import torch
+from safetensors import SafetensorError, safe_open
 from torch import Tensor, nn
 from torch.distributed.checkpoint.api import CheckpointException
 from torch.distributed.checkpoint.hf_storage import HuggingFaceStorageReader, HuggingFaceStorageWriter
@@ -33,6 +35,8 @@ from wsm_model.ranks import rank_and_world_size, wait_for_all
 _STATE = "state.json"
 _FOLDER = re.compile(r"step-(\d{6,})")
 _MOMENTS = ("exp_avg", "exp_avg_sq")
+NOTHING: Mapping[str, Tensor] = MappingProxyType({})
+"""Averaged weights of a run that keeps none."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,8 +54,21 @@ class TrainingState:
     identity: Mapping[str, object]
 
 
-def save_checkpoint(folder: Path, model: nn.Module, optimiser: torch.optim.Optimizer, state: TrainingState) -> Path:
+def save_checkpoint(
+    folder: Path,
+    model: nn.Module,
+    optimiser: torch.optim.Optimizer,
+    state: TrainingState,
+    average: Mapping[str, Tensor] = NOTHING,
+) -> Path:
     """Write a checkpoint; every rank writes its own part, and the last act is one rank's `state.json`.
+
+    Args:
+        folder: of the run's checkpoints.
+        model: its parameters.
+        optimiser: its moments.
+        state: where the run stands.
+        average: averaged weights by name, where there are any.
 
     Returns:
         The folder of this step.
@@ -68,7 +85,7 @@ def save_checkpoint(folder: Path, model: nn.Module, optimiser: torch.optim.Optim
     wait_for_all()
     writer = HuggingFaceStorageWriter(str(path), save_distributed=True)
     with _quiet_alone(), _causes_raised():
-        save(_tensors(model, optimiser), storage_writer=writer, no_dist=world_size == 1)
+        save(_tensors(model, optimiser, average), storage_writer=writer, no_dist=world_size == 1)
     wait_for_all()
     own = {file.name: xxh3_128_file(file) for file in sorted(path.glob("*.safetensors"))[rank::world_size]}
     write_text(path / f"digests-{rank:05d}.json", canonical_json(own) + "\n")
@@ -81,9 +98,13 @@ def save_checkpoint(folder: Path, model: nn.Module, optimiser: torch.optim.Optim
 
 
 def load_checkpoint(
-    path: Path, model: nn.Module, optimiser: torch.optim.Optimizer, identity: Mapping[str, object]
+    path: Path,
+    model: nn.Module,
+    optimiser: torch.optim.Optimizer,
+    identity: Mapping[str, object],
+    average: Mapping[str, Tensor] = NOTHING,
 ) -> TrainingState:
-    """Fill model and optimiser in place; returns where the run stood.
+    """Fill model, optimiser and averaged weights in place; returns where the run stood.
 
     Raises:
         ConfigError: the checkpoint is of another model, settings or release; says in which fields.
@@ -92,17 +113,47 @@ def load_checkpoint(
     state = read_state(path)
     _require_same(path, state.identity, identity)
     _prepare_moments(model, optimiser, state.step)
+    fill(path, _tensors(model, optimiser, average), vouched=True)
+    return state
+
+
+def fill(path: Path, tensors: Mapping[str, Tensor], *, vouched: bool) -> None:
+    """Read tensors in place from the safetensors files of a folder, each rank what it keeps.
+
+    Args:
+        path: the folder; it may hold others too.
+        tensors: by their names there.
+        vouched: whether it is a checkpoint, whose files have digests that are compared.
+
+    Raises:
+        IntegrityError: a file is damaged, or a tensor is not there.
+    """
     rank, world_size = rank_and_world_size()
     try:
-        _require_sound(path, rank, world_size)
+        if vouched:
+            _require_sound(path, rank, world_size)
         reader = HuggingFaceStorageReader(str(path))
         with _quiet_alone():
-            load(_tensors(model, optimiser), storage_reader=reader, no_dist=world_size == 1)
+            load(dict(tensors), storage_reader=reader, no_dist=world_size == 1)
     except (OSError, RuntimeError, KeyError, TypeError, ValueError, CheckpointException) as error:
-        raise IntegrityError(
-            f"{path} must be a whole checkpoint, but: {_cause(error)}; delete it to go on from the one before"
-        ) from error
-    return state
+        thing, advice = ("checkpoint", "delete it to go on from the one before") if vouched else ("model", "restore it")
+        raise IntegrityError(f"{path} must be a whole {thing}, but: {_cause(error)}; {advice}") from error
+
+
+def tensor_names(path: Path) -> set[str]:
+    """Names of the tensors of a checkpoint.
+
+    Raises:
+        IntegrityError: a file is damaged.
+    """
+    names: set[str] = set()
+    for file in sorted(path.glob("*.safetensors")):
+        try:
+            with safe_open(file, framework="pt") as opened:
+                names |= set(opened.keys())
+        except (SafetensorError, OSError) as error:
+            raise IntegrityError(f"{file} must be a whole safetensors file, but: {error}") from error
+    return names
 
 
 def _require_sound(path: Path, rank: int, world_size: int) -> None:
@@ -171,8 +222,8 @@ def _cause(error: BaseException) -> str:
     return "; ".join(sorted({str(cause) for cause, _ in error.failures.values()}))
 
 
-def _tensors(model: nn.Module, optimiser: torch.optim.Optimizer) -> dict[str, Tensor]:
-    tensors: dict[str, Tensor] = {}
+def _tensors(model: nn.Module, optimiser: torch.optim.Optimizer, average: Mapping[str, Tensor]) -> dict[str, Tensor]:
+    tensors: dict[str, Tensor] = {f"average.{name}": tensor for name, tensor in average.items()}
     for name, parameter in model.named_parameters():
         tensors[f"model.{name}"] = parameter.detach()
         for moment in _MOMENTS:
@@ -185,7 +236,8 @@ def _prepare_moments(model: nn.Module, optimiser: torch.optim.Optimizer, step: i
     """Give the optimiser the state it has after `step` steps, for the moments to be read into."""
     for parameter in model.parameters():
         moments = {moment: torch.zeros_like(parameter) for moment in _MOMENTS}
-        optimiser.state[parameter] = {"step": torch.tensor(float(step)), **moments} if step else {}
+        count = torch.tensor(float(step), device=parameter.device)  # where a fused step looks for it
+        optimiser.state[parameter] = {"step": count, **moments} if step else {}
 
 
 def _require_same(path: Path, found: Mapping[str, object], wanted: Mapping[str, object]) -> None:

@@ -96,6 +96,8 @@ class TrainingConfig(LoopConfig):
         depth_noise: largest share s of noise eps in the depth latents d that later chunks see: of each sequence a
             share is drawn uniformly up to it, and they see (1 - s) d + s eps. In use they see estimates, which are not
             the truth (paper silent; 0: the truth, its teacher forcing).
+        ema_decay: decay of an average of the weights over the steps, such as 0.999: it is what is measured, drawn and
+            exported (paper silent; 0: none is kept).
         loss: weights of the parts.
     """
 
@@ -104,10 +106,13 @@ class TrainingConfig(LoopConfig):
     precision: Precision = Precision.BFLOAT16
     checkpoint_activations: bool = False
     depth_noise: float = 0.0
+    ema_decay: float = 0.0
     loss: LossConfig = field(default_factory=LossConfig)
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if not 0 <= self.ema_decay < 1:
+            raise ValueError(f"ema_decay must lie in [0, 1), found {self.ema_decay}")
         if not 0 <= self.depth_noise <= 1:
             raise ValueError(f"depth_noise must lie in [0, 1], found {self.depth_noise}")
         for name in ("micro_rows", "seed"):

@@ -8,12 +8,14 @@ from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 import torch
-from torch import nn
+from torch import Tensor, nn
 from torch.nn.utils import clip_grad_norm_
 
 from wsm_data.errors import NumericalError, Preempted
 from wsm_model.ranks import any_rank, rank_and_world_size, whole
+from wsm_model.training.average import WeightAverage, follow
 from wsm_model.training.checkpoint import (
+    NOTHING,
     TrainingState,
     checkpoints,
     drop_old_checkpoints,
@@ -23,6 +25,7 @@ from wsm_model.training.checkpoint import (
 from wsm_model.training.config import LoopConfig
 from wsm_model.training.metrics import MetricsWriter
 from wsm_model.training.schedule import learning_rate, set_learning_rate
+from wsm_model.training.work import StepWork, peak_memory_gib, speed
 
 BatchT = TypeVar("BatchT")
 BatchT_co = TypeVar("BatchT_co", covariant=True)
@@ -51,10 +54,12 @@ class StepResult:
     Attributes:
         losses: total and parts, over all ranks.
         gradient_norm: before clipping.
+        work: what it worked through, where that is counted.
     """
 
     losses: Mapping[str, float]
     gradient_norm: float
+    work: StepWork | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,12 +88,19 @@ class TrainingRun:
         optimiser: of its parameters.
         folder: of the checkpoints.
         identity: what the run is made from; checkpoints of another are refused by it.
+        average: of the weights, where one is kept.
     """
 
     model: nn.Module
     optimiser: torch.optim.Optimizer
     folder: Path
     identity: Mapping[str, object]
+    average: WeightAverage | None = None
+
+    @property
+    def averaged_weights(self) -> Mapping[str, Tensor]:
+        """Averaged weights by name; nothing where none are kept."""
+        return NOTHING if self.average is None else self.average.weights
 
 
 def total_steps(config: LoopConfig, loader: BatchSource[object]) -> int:
@@ -106,7 +118,7 @@ def resume(run: TrainingRun, loader: BatchSource[object]) -> int:
     found = checkpoints(run.folder)
     if not found:
         return 0
-    state = load_checkpoint(found[-1], run.model, run.optimiser, run.identity)
+    state = load_checkpoint(found[-1], run.model, run.optimiser, run.identity, run.averaged_weights)
     loader.load_state_dict(dict(state.loader))
     return state.step
 
@@ -143,17 +155,13 @@ def train(
             set_learning_rate(run.optimiser, rate)
             result = step(batch)
             done += 1
+            if run.average is not None:
+                follow(run.average, run.model, done)
             is_last = done == steps
             if rank == 0:
                 hooks.progress(done)
                 if done % config.log_every == 0 or is_last:
-                    told = {
-                        "gradient_norm": result.gradient_norm,
-                        "learning_rate": rate,
-                        "seconds": time.perf_counter() - started_s,
-                        "data_wait_seconds": waited_s,
-                    }
-                    hooks.metrics(done, {**result.losses, **told})
+                    hooks.metrics(done, _told(result, rate, time.perf_counter() - started_s, waited_s))
             if config.sample_every and done % config.sample_every == 0:
                 hooks.sample(done)
             stops = any_rank(hooks.must_stop())
@@ -163,6 +171,7 @@ def train(
                     run.model,
                     run.optimiser,
                     TrainingState(step=done, loader=loader.state_dict(), identity=run.identity),
+                    run.averaged_weights,
                 )
                 if rank == 0:
                     drop_old_checkpoints(run.folder, config.keep_checkpoints)
@@ -170,6 +179,19 @@ def train(
                 break
             if stops:
                 raise Preempted(f"told to end (SIGTERM): {path} holds step {done}; run the same command again to go on")
+
+
+def _told(result: StepResult, rate: float, seconds: float, waited_s: float) -> dict[str, float]:
+    """What is told of a step; its speed is that of step and wait together."""
+    return {
+        **result.losses,
+        "gradient_norm": result.gradient_norm,
+        "learning_rate": rate,
+        "seconds": seconds,
+        "data_wait_seconds": waited_s,
+        **({} if result.work is None else speed(result.work, seconds + waited_s)),
+        "peak_memory_gib": peak_memory_gib(),
+    }
 
 
 def _timed(loader: BatchSource[BatchT]) -> Iterator[tuple[float, BatchT]]:

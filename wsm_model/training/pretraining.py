@@ -1,6 +1,7 @@
 """A step of pretraining on the objective (paper, section 3.3 and appendix B.1)."""
 
 import math
+from dataclasses import replace
 
 import torch
 from torch import Tensor
@@ -13,6 +14,7 @@ from wsm_model.precision import autocast
 from wsm_model.ranks import rank_and_world_size, sum_over_ranks
 from wsm_model.training.config import TrainingConfig
 from wsm_model.training.loop import StepResult, TrainingRun, finish_step
+from wsm_model.training.work import StepWork, work_of
 
 
 def pretraining_step(
@@ -26,7 +28,7 @@ def pretraining_step(
         NumericalError: a loss or a gradient is not finite; names step, clips and parts.
     """
     device = batch.rgb.device
-    counts = _global_counts(batch, device)
+    counts, work = _global_counts(model, batch, device)
     sums: dict[str, float] = {}
     bad: list[str] = []
     parts = training_inputs(
@@ -45,7 +47,8 @@ def pretraining_step(
             bad += part.keys
     names = sorted(sums)
     totals = dict(zip(names, sum_over_ranks([sums[name] for name in names], device), strict=True))
-    return finish_step(run, totals, config.optimiser.clip_norm, lambda wrong: _not_finite(batch, wrong, bad))
+    taken = finish_step(run, totals, config.optimiser.clip_norm, lambda wrong: _not_finite(batch, wrong, bad))
+    return replace(taken, work=work)
 
 
 def _backward(
@@ -61,10 +64,15 @@ def _backward(
     return dict(zip(names, values, strict=True))
 
 
-def _global_counts(batch: ClipBatch[Tensor], device: torch.device) -> LossCounts:
-    own = loss_counts(batch.spans)
-    dreamed, latents, sequences = sum_over_ranks([own.dreamed, own.latents, own.sequences], device)
-    return LossCounts(dreamed=dreamed, latents=latents, sequences=sequences)
+def _global_counts(
+    model: WorldSlamModel, batch: ClipBatch[Tensor], device: torch.device
+) -> tuple[LossCounts, StepWork]:
+    """What means are taken over, and what is worked through, over all ranks."""
+    own, work = loss_counts(batch.spans), work_of(model, batch.spans)
+    given = [own.dreamed, own.latents, own.sequences, work.tokens, work.flop]
+    dreamed, latents, sequences, tokens, flop = sum_over_ranks(given, device)
+    counts = LossCounts(dreamed=dreamed, latents=latents, sequences=sequences)
+    return counts, StepWork(latents=latents, tokens=tokens, flop=flop)
 
 
 def _not_finite(batch: ClipBatch[Tensor], wrong: str, bad: list[str]) -> str:

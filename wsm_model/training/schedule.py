@@ -25,7 +25,10 @@ def learning_rate(step: int, steps: int, config: OptimiserConfig) -> float:
 
 
 def make_optimiser(model: nn.Module, config: OptimiserConfig) -> torch.optim.AdamW:
-    """AdamW with a group for each learning rate (generation expert and goal embedding, everything else) and decay."""
+    """AdamW with a group for each learning rate (generation expert and goal embedding, everything else) and decay.
+
+    One kernel takes the step of many parameters, on a GPU and on a processor.
+    """
     members: dict[tuple[float, float], list[nn.Parameter]] = defaultdict(list)
     for name, parameter in model.named_parameters():
         is_slower = expert_of_parameter(name) in (Expert.GENERATION, None)
@@ -41,6 +44,7 @@ def make_optimiser(model: nn.Module, config: OptimiserConfig) -> torch.optim.Ada
         lr=config.learning_rate,
         betas=(config.beta_1, config.beta_2),
         eps=config.eps,
+        fused=True,
     )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import torch
 
 from wsm_data.errors import ConfigError
+from wsm_data.schema.latent_standard import LatentStandard
 from wsm_data.shards.latent_standard import latent_standard
 from wsm_data.shards.manifest import ReleaseManifest
 
@@ -58,13 +59,27 @@ def convert(stored: torch.Tensor, out: torch.Tensor, standardisation: Standardis
             target.copy_(values)
 
 
-def standardisations(manifest: ReleaseManifest, *, depth: bool = True) -> Mapping[str, Standardisation]:
+def standardisations(
+    manifest: ReleaseManifest, *, depth: bool = True, standard: LatentStandard | None = None
+) -> Mapping[str, Standardisation]:
     """How `rgb` and, where it is asked for, `depth` latents of a release are standardised.
 
+    Args:
+        manifest: of the release.
+        depth: whether depth is asked for.
+        standard: by which numbers; None: those of the release.
+
     Raises:
-        ConfigError: the release has no statistics, for want of training clips or of their depth.
+        ConfigError: the release has no statistics, for want of training clips or of their depth, or the standard is
+            that of another codec.
     """
-    standard = latent_standard(manifest)
+    standard = latent_standard(manifest) if standard is None else standard
+    if standard.codec_digest != manifest.codec.digest:
+        raise ConfigError(
+            f"latents of {manifest.name} are those of {manifest.codec.name} (digest {manifest.codec.digest}), and "
+            f"cannot be standardised by the numbers of {standard.codec} (digest {standard.codec_digest}); use data of "
+            "that codec"
+        )
     rgb = {"rgb": _standardisation(standard.rgb_mean, standard.rgb_std)}
     if not depth:
         return rgb

@@ -49,7 +49,7 @@ class CudaTransfer:
 
     def __init__(self, device: torch.device, read: ReadConfig, manifest: ReleaseManifest, *, depth: bool = True):
         self._device, self._dtype = device, LATENT_DTYPES[read.dtype]
-        self._standardise = standardisations(manifest, depth=depth) if read.standardise else {}
+        self._standardise = standardisations(manifest, depth=depth, standard=read.standard) if read.standardise else {}
         self._stream = torch.cuda.Stream(device)
 
     def __call__(self, block: BatchBlock) -> Batch:

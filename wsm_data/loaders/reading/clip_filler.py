@@ -56,8 +56,13 @@ class ClipFiller:
         as_stored = torch.device(read.device).type != "cpu"  # not looked for: a forked process must not ask for it
         self.latent_shape = (codec.channels, *cells)
         self.dtype = _STORED if as_stored else LATENT_DTYPES[read.dtype]
-        self._standardise = standardisations(manifest, depth=depth) if read.standardise and not as_stored else {}
-        if self._standardise and len({table.release.store.root for table in sources.tables}) > 1:
+        here = read.standardise and not as_stored
+        self._standardise = standardisations(manifest, depth=depth, standard=read.standard) if here else {}
+        if (
+            self._standardise
+            and read.standard is None
+            and len({table.release.store.root for table in sources.tables}) > 1
+        ):
             _LOG.warning("latents of all sources are standardised by the statistics of the first, %s", manifest.name)
         self._latents = LATENT_TENSORS if depth else LATENT_TENSORS[:1]
         self._converts = self.dtype is not _STORED or bool(self._standardise)

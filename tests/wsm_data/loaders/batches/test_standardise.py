@@ -12,6 +12,7 @@ from hypothesis.extra import numpy as hnp
 from wsm_data.errors import ConfigError
 from wsm_data.loaders.batches.batch import LATENT_DTYPES
 from wsm_data.loaders.batches.standardise import Standardisation, convert, standardisations
+from wsm_data.shards.latent_standard import latent_standard
 from wsm_data.shards.statistics import LatentStatistics
 
 CHANNELS = 3
@@ -116,3 +117,14 @@ def test_a_release_without_training_clips_cannot_be_standardised(released):
     manifest = replace(released.release.manifest, depth_statistics=empty, rgb_statistics=empty)
     with pytest.raises(ConfigError, match=r"must have latent statistics to standardise by.*standardise = false"):
         standardisations(manifest)
+
+
+def test_a_given_standard_stands_before_that_of_the_release_and_must_be_of_its_codec(released):
+    manifest = released.release.manifest
+    own = latent_standard(manifest)
+    given_one = replace(own, rgb_mean=(7.0,) * 48, depth_std=(2.0,) * 48)
+    found = standardisations(manifest, standard=given_one)
+    np.testing.assert_array_equal(found["rgb"].mean.flatten(), np.float32([7.0] * 48))
+    np.testing.assert_array_equal(found["depth"].scale.flatten(), np.float32([0.5] * 48))
+    with pytest.raises(ConfigError, match="cannot be standardised by the numbers of dct"):
+        standardisations(manifest, standard=replace(own, codec="dct", codec_digest="0"))
