@@ -9,14 +9,27 @@ from pipelines.commands.command import Command
 from pipelines.commands.stage_options import filling
 from pipelines.recipe import recipe_summaries
 from pipelines.running.options import StageRequest
+from wsm_data.errors import ConfigError
+from wsm_data.files.locations import is_url
 
 
 def run_recipe(
     recipe: Annotated[str, typer.Argument(metavar="RECIPE", help="Name of a recipe, or path of a TOML file.")],
     request: StageRequest,
+    out: Annotated[str, typer.Option("--out", "-o", help="Folder or URL to write; what is done there is kept.")],
+    work: Annotated[
+        Path | None, typer.Option("--work", help="Folder in which the stages work, where --out is a URL.")
+    ] = None,
 ) -> None:
     """Run the stages of any recipe."""
-    _run(recipe, request)
+    if is_url(out):
+        from pipelines.operations.runs.at_url import run_at_url
+
+        run_at_url(recipe, request, out, work)
+    elif work is not None:
+        raise ConfigError(f"--work is for an --out that is a URL, found {out}; leave it out")
+    else:
+        _run(recipe, request)
 
 
 def run_demo(request: StageRequest) -> None:

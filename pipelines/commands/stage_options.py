@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from inspect import Parameter, Signature, signature
+from pathlib import Path
 from typing import Any
 
 from pipelines.commands.options import (
@@ -69,8 +70,9 @@ def stage_request(values: Mapping[str, Any]) -> StageRequest:
         for name, value in values.items()
     }
     options = RunOptions(**{name: given[name] for name in _OF_RUN if name in given})
-    of_request = {name: given[name] for name in ("out", *_OF_REQUEST) if name in given}
-    return StageRequest(**of_request, options=options)
+    of_request = {name: given[name] for name in _OF_REQUEST if name in given}
+    out = given.get("out")
+    return StageRequest(**of_request, out=None if out is None else Path(out), options=options)
 
 
 def _with_options(run: Callable[..., None], out: Parameter, *first: Parameter) -> Callable[..., None]:
@@ -79,7 +81,8 @@ def _with_options(run: Callable[..., None], out: Parameter, *first: Parameter) -
     own = [one for one in signature(run).parameters.values() if one.name not in {"request", *named}]
     options = [_option(name, kind, getattr(REQUEST, name)) for name, kind in _OF_REQUEST.items()]
     options += [_option(name, kind, getattr(REQUEST.options, name)) for name, kind in _OF_RUN.items()]
-    parameters = [*first, *(one.replace(kind=Parameter.KEYWORD_ONLY) for one in own), out, *options]
+    outs = [] if "out" in signature(run).parameters else [out]  # a command may take more than a path
+    parameters = [*first, *(one.replace(kind=Parameter.KEYWORD_ONLY) for one in own), *outs, *options]
     passed = {*named, *(one.name for one in own)}
 
     def command(**values: Any) -> None:

@@ -1,6 +1,6 @@
 """`wsm run` and `wsm demo`: the stages of a recipe, one after the other, in one run folder."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,11 +18,16 @@ from wsm_data.errors import ConfigError
 from wsm_data.files.digest import digest_json
 
 
-def run_recipe(recipe: str, request: StageRequest) -> None:
+def run_recipe(recipe: str, request: StageRequest, on_finished: Callable[[str], object] | None = None) -> None:
     """Run the stages of a recipe, each in a folder of its own, and say where the results are.
 
     The settings of all stages are built, and compared with those their folders were begun with, before the first of
     them runs.
+
+    Args:
+        recipe: name or path of the recipe.
+        request: what is asked.
+        on_finished: called with the name of each stage that came to its end.
 
     Raises:
         ConfigError: the recipe, a setting or an option is wrong, or a folder belongs to other settings.
@@ -39,7 +44,7 @@ def run_recipe(recipe: str, request: StageRequest) -> None:
     if options.dry_run:
         show_run(configs, out, first, others)
         return
-    run_in_order(configs, out, lambda name: first if name == next(iter(configs)) else others, run_engine)
+    run_in_order(configs, out, lambda name: first if name == next(iter(configs)) else others, run_engine, on_finished)
     for name in configs:
         print_result(name, out / name)
 

@@ -15,7 +15,11 @@ from pipelines.running.stage_report import StageReport, summary_table
 
 
 def run_in_order(
-    configs: Mapping[str, object], run: Path, options_of: Callable[[str], RunOptions], engine: Engine
+    configs: Mapping[str, object],
+    run: Path,
+    options_of: Callable[[str], RunOptions],
+    engine: Engine,
+    on_finished: Callable[[str], object] | None = None,
 ) -> None:
     """Run stages, each in the folder of its name, and print the table of all that came to their end.
 
@@ -26,6 +30,7 @@ def run_in_order(
         run: folder of the run.
         options_of: what is asked of a stage, by its name.
         engine: who runs the workers.
+        on_finished: called with the name of each stage that came to its end.
     """
     names = list(configs)
     reports: dict[str, StageReport] = {}
@@ -36,6 +41,8 @@ def run_in_order(
             name = names[position]
             try:
                 reports[name] = run_stage(load_stage(name), configs[name], run / name, options_of(name), engine)
+                if on_finished:
+                    on_finished(name)
                 position += 1
             except OutputsNeeded as needed:
                 if needed.folder.parent != run.absolute() or needed.folder.name in asked_back:
