@@ -19,6 +19,9 @@ Assignments = Annotated[
     typer.Option("--set", "-s", help="One setting: key=value or section.key=value. Repeatable."),
 ]
 Workers = Annotated[int, typer.Option("--workers", "-w", min=0, help="Worker processes; 0: one a core.")]
+Gpus = Annotated[
+    int, typer.Option("--gpus", min=0, help="GPUs that encode for all workers; 0: each worker has its own codec.")
+]
 Engine = Annotated[EngineName, typer.Option("--engine", help="Where workers run: this machine, ray or Slurm.")]
 Limit = Annotated[int, typer.Option("--limit", min=0, help="At most this many pending units; 0: all.")]
 Only = Annotated[

@@ -11,6 +11,7 @@ from pipelines.commands.options import (
     DryRun,
     Engine,
     Fork,
+    Gpus,
     Limit,
     LogFile,
     MaxRefused,
@@ -38,6 +39,7 @@ _OF_REQUEST: Mapping[str, object] = {
 }
 _OF_RUN: Mapping[str, object] = {
     "workers": Workers,
+    "gpus": Gpus,
     "limit": Limit,
     "only": Only,
     "dry_run": DryRun,

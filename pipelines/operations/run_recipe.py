@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
+from pipelines.artifacts.codec_servers import require_gpus
 from pipelines.operations.dry_run import show_run
 from pipelines.operations.run_stage import print_result
 from pipelines.operations.runs.in_order import run_in_order
@@ -39,6 +40,7 @@ def run_recipe(recipe: str, request: StageRequest, on_finished: Callable[[str], 
         loaded = replace(loaded, settings={**loaded.settings, "pack": packing})
     run_engine = engine(request.engine)
     out, configs = _choose_folder(loaded, request.out or Path("run"), options.fork)
+    _require_gpus(configs, options.gpus)
     first = replace(options, fork=False)
     others = replace(first, limit=0, only=())
     if options.dry_run:
@@ -60,6 +62,12 @@ def _choose_folder(recipe: Recipe, out: Path, fork: bool) -> tuple[Path, Mapping
     wanted = {name: fingerprint(load_stage(name), config) for name, config in configs.items()}
     beside = out.with_name(f"{out.name}-{digest_json(wanted)[:8]}")
     return beside, _checked_configs(recipe, beside)
+
+
+def _require_gpus(configs: Mapping[str, object], gpus: int) -> None:
+    codecs = [codec for config in configs.values() if isinstance(codec := getattr(config, "codec", None), CodecConfig)]
+    for codec in codecs if gpus else ():
+        require_gpus(codec, gpus)
 
 
 def _checked_configs(recipe: Recipe, out: Path) -> Mapping[str, object]:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from pipelines.running.engines.choice import EngineName
+from wsm_data.errors import ConfigError
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -13,6 +14,7 @@ class RunOptions:
 
     Attributes:
         workers: worker processes; 0 for one a core.
+        gpus: GPUs of this machine, each with a loaded codec that the workers share; 0 where each worker has its own.
         limit: at most this many pending units; 0 for all.
         only: patterns of unit ids (`gibson_*/*`); empty for all.
         dry_run: list what would be done and stop.
@@ -28,6 +30,7 @@ class RunOptions:
     """
 
     workers: int = 1
+    gpus: int = 0
     limit: int = 0
     only: tuple[str, ...] = ()
     dry_run: bool = False
@@ -64,3 +67,10 @@ class StageRequest:
     engine: EngineName = EngineName.LOCAL
     log_file: Path | None = None
     options: RunOptions = field(default_factory=lambda: RunOptions(workers=0))
+
+    def __post_init__(self) -> None:
+        if self.options.gpus and self.engine is not EngineName.LOCAL:
+            raise ConfigError(
+                f"--gpus is of this machine, and --engine {self.engine} works on others; leave --gpus out, or run "
+                "with --engine local on a machine with GPUs"
+            )

@@ -203,13 +203,17 @@ def _work(job: _Job[ConfigT], selected: Sequence[Unit]) -> None:
     standing = [outcome for unit, outcome in job.settled().outcomes.items() if unit not in again]
     count = replace(count_refusals(standing, len(job.units), job.stage.parts_fact), found=None)
     _keep_to_budget(job, count)
-    work = partial(_process_batch, job.stage, job.config, StageContext(out=job.out))
     with (
+        _serving(job, selected) as server,
         progress(job.stage.name, len(selected), job.options) as tell,
         _reclaiming(job, again) as reclaim,
         _appender(job) as append,
         closing(
-            job.engine(_batches(selected, job.options.processes), work, job.options.processes)
+            job.engine(
+                _batches(selected, job.options.processes),
+                partial(_process_batch, job.stage, job.config, StageContext(out=job.out, server=server)),
+                job.options.processes,
+            )
         ) as outcomes,  # no worker outlives the lock
     ):
         for outcome in outcomes:
@@ -218,6 +222,12 @@ def _work(job: _Job[ConfigT], selected: Sequence[Unit]) -> None:
             tell(outcome)
             _keep_to_budget(job, count)
             reclaim(outcome.unit)
+
+
+def _serving(job: _Job[ConfigT], selected: Sequence[Unit]) -> AbstractContextManager[str]:
+    if job.stage.serve is None or not job.options.gpus or not selected:
+        return nullcontext("")
+    return job.stage.serve(job.config, job.options.gpus)
 
 
 def _reclaiming(job: _Job[ConfigT], again: Collection[str]) -> AbstractContextManager[Callable[[str], None]]:

@@ -1,6 +1,7 @@
 """What a stage is: a frozen bundle of plain functions that turn inputs into files, unit by unit."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 from typing import Any, Generic, TypeAlias, TypeVar
@@ -74,9 +75,11 @@ class StageContext:
 
     Attributes:
         out: the stage's own folder.
+        server: address of what `Stage.serve` started; empty where nothing was.
     """
 
     out: Path
+    server: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,6 +128,8 @@ class Stage(Generic[ConfigT]):
             although no unit is redone. None where there is none.
         reads: outputs of other stages that nothing but these units ever reads: once they are done, those can be given
             up. None where there are none.
+        serve: holds so many GPUs while the workers are there; yields the address at which they ask. It is called where
+            there are pending units and GPUs were asked for. None where the stage has no use for one.
         conventions: what decides the outputs and stands in a file that a setting names; a dry run prints it beside the
             settings. None where there is no such file.
     """
@@ -138,6 +143,7 @@ class Stage(Generic[ConfigT]):
     parts_fact: str = ""
     finish_inputs: Callable[[ConfigT], Mapping[str, str]] | None = None
     reads: Callable[[ConfigT, Sequence[Unit]], Reads] | None = None
+    serve: Callable[[ConfigT, int], AbstractContextManager[str]] | None = None
     conventions: Callable[[ConfigT], object] | None = None
 
 

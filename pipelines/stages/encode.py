@@ -2,11 +2,13 @@
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
+from pipelines.artifacts.codec_servers import codec_servers
 from pipelines.artifacts.episode_table import read_episodes
 from pipelines.artifacts.layout import clips_folder, codec_path, map_path, records_path
 from pipelines.artifacts.source import IndexedSource, conventions_digest, indexed_source
@@ -18,9 +20,10 @@ from wsm_data.clips.config import ClipConfig
 from wsm_data.clips.episode_gate import check_episode
 from wsm_data.clips.path_on_floor import lay_path
 from wsm_data.clips.scene_view import SceneView, view_scene
-from wsm_data.codecs.base import VideoCodec
+from wsm_data.codecs.base import ClipCodec, VideoCodec
 from wsm_data.codecs.clip_video import VideoMemory
 from wsm_data.codecs.registry import CodecConfig, describe_codec, make_codec
+from wsm_data.codecs.served import ServedCodec
 from wsm_data.errors import ConfigError, DataError
 from wsm_data.files.atomic import write_text
 from wsm_data.files.digest import sha256_bytes
@@ -33,6 +36,8 @@ from wsm_data.schema.arrays import Float32Array
 from wsm_data.schema.episode import EpisodeRecord
 from wsm_data.schema.verdict import Refusal
 from wsm_data.shards.fragment import SIDECAR_SUFFIX, Fragment, build_fragment, write_fragment
+
+CodecT = TypeVar("CodecT", bound=ClipCodec)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,7 +133,7 @@ def _process(batch: Sequence[Unit], config: EncodeConfig, context: StageContext)
             yield refused(unit, DataError(scene.reason, message, scene.details))
         return
     source = indexed_source(config.index)
-    codec = _loaded_codec(config.codec, batch[0].inputs["codec"])
+    codec = _codec(config.codec, batch[0].inputs["codec"], context.server)
     map_file = map_path(config.map, scene.container.id)
     scene_map = load_scene_map(vouched_by_ledger(config.map, scene.mapped, map_file))
     waiting: list[_Prepared] = []
@@ -143,10 +148,23 @@ def _process(batch: Sequence[Unit], config: EncodeConfig, context: StageContext)
     yield from _encode(waiting, scene, source, codec, config, context.out)
 
 
+def _codec(config: CodecConfig, digest: str, server: str) -> ClipCodec:
+    return _served_codec(config, digest, server) if server else _loaded_codec(config, digest)
+
+
 @lru_cache(maxsize=1)
 def _loaded_codec(config: CodecConfig, digest: str) -> VideoCodec:
     """The codec of the units, loaded once in a process; the digest tells when files in its folder were replaced."""
-    codec = make_codec(config)
+    return _of_the_digest(make_codec(config), config, digest)
+
+
+@lru_cache(maxsize=1)
+def _served_codec(config: CodecConfig, digest: str, address: str) -> ServedCodec:
+    """The codec that others hold for this process; asked once whether it is that of the units."""
+    return _of_the_digest(ServedCodec(address), config, digest)
+
+
+def _of_the_digest(codec: CodecT, config: CodecConfig, digest: str) -> CodecT:
     if codec.describe().digest != digest:
         raise ConfigError(f"the weights in {config.weights} were changed while the stage ran; run `wsm encode` again")
     return codec
@@ -183,7 +201,7 @@ def _encode(
     waiting: Sequence[_Prepared],
     scene: _SceneInput,
     source: IndexedSource,
-    codec: VideoCodec,
+    codec: ClipCodec,
     config: EncodeConfig,
     out: Path,
 ) -> Iterator[Outcome]:
@@ -224,7 +242,7 @@ def _written(one: _Prepared, fragment: Fragment, quality: dict[str, object] | No
 
 
 def _quality(
-    one: _Prepared, latents: Sequence[Float32Array], codec: VideoCodec, config: EncodeConfig
+    one: _Prepared, latents: Sequence[Float32Array], codec: ClipCodec, config: EncodeConfig
 ) -> dict[str, object] | None:
     rank = int(sha256_bytes(one.unit.id.encode())[:8], 16) / 16**8
     if rank >= config.quality_share:
@@ -240,6 +258,16 @@ def _finish(config: EncodeConfig, context: StageContext, settled: Settled) -> Fi
     return Finished(outputs=(str(codec_path(context.out).relative_to(context.out)),))
 
 
+def _serve(config: EncodeConfig, gpus: int) -> AbstractContextManager[str]:
+    return codec_servers(config.codec, gpus)
+
+
 STAGE = Stage(
-    name="encode", version=5, config_type=EncodeConfig, list_units=_list_units, process=_process, finish=_finish
+    name="encode",
+    version=5,
+    config_type=EncodeConfig,
+    list_units=_list_units,
+    process=_process,
+    finish=_finish,
+    serve=_serve,
 )

@@ -9,7 +9,7 @@ from wsm_data.checks.depth_measured import check_depth_measured
 from wsm_data.checks.gate import require_kept
 from wsm_data.clips.config import ClipConfig
 from wsm_data.clips.scene_view import SceneView
-from wsm_data.codecs.base import VideoCodec
+from wsm_data.codecs.base import ClipCodec
 from wsm_data.codecs.clip_video import VideoMemory, depth_video, pad_frames, padded_length, rgb_video
 from wsm_data.codecs.depth import depth_m_from_latent_video, valid_share
 from wsm_data.codecs.quality import DEPTH_EDGES_M, CodecQuality, clip_quality, depth_error_by_range
@@ -123,7 +123,7 @@ def build_clip(
 
 
 def measure_quality(
-    videos: ClipVideos, latents: Sequence[Float32Array], codec: VideoCodec, config: ClipConfig, frames: int
+    videos: ClipVideos, latents: Sequence[Float32Array], codec: ClipCodec, config: ClipConfig, frames: int
 ) -> CodecQuality:
     """Decode a clip's float16 latents again and compare every 7th of its `frames` own frames with what went in.
 

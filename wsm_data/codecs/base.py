@@ -24,7 +24,20 @@ class EncoderState(Protocol):
         """All of it as arrays, to be stored; `VideoCodec.restored` is the way back."""
 
 
-class VideoCodec(Protocol):
+class ClipCodec(Protocol):
+    """What a clip is made with: the part of a `VideoCodec` that encodes and decodes whole videos."""
+
+    def encode_many(self, videos: Sequence[Float32Array]) -> list[Float32Array]:
+        """See `VideoCodec.encode_many`."""
+
+    def decode(self, latents: Float32Array) -> Float32Array:
+        """See `VideoCodec.decode`."""
+
+    def describe(self) -> CodecInfo:
+        """See `VideoCodec.describe`."""
+
+
+class VideoCodec(ClipCodec, Protocol):
     """A causal codec: T = 1 + 4k frames to F = 1 + k latents; latent j sees no frame after 4j, no frame a later latent.
 
     Videos are float32 [T, H, W, 3] in [-1, 1], H and W multiples of 32; latents are float32 [F, C, h, w] with

@@ -20,6 +20,7 @@ ASKED = {
     "-s a=1 --set b.c=2": {"assignments": ("a=1", "b.c=2")},
     "--engine ray": {"engine": EngineName.RAY},
     "--workers 3": {"workers": 3},
+    "--gpus 2": {"gpus": 2},
     "--limit 4": {"limit": 4},
     "--only a* --only b": {"only": ("a*", "b")},
     "--dry-run": {"dry_run": True},
