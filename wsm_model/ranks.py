@@ -10,11 +10,15 @@ from contextlib import contextmanager
 import torch
 import torch.distributed as dist
 from torch import Tensor, nn
-from torch.distributed.device_mesh import init_device_mesh
-from torch.distributed.fsdp import FSDPModule, fully_shard
+from torch.distributed.device_mesh import DeviceMesh, init_device_mesh
+from torch.distributed.fsdp import FSDPModule, MixedPrecisionPolicy, fully_shard
+from torch.distributed.tensor import DTensor, distribute_tensor
 
-from wsm_model.model import WorldSlamModel
-from wsm_model.mot.transformer import MixtureOfTransformers
+from wsm_data.errors import ConfigError
+from wsm_model.config import ModelConfig
+from wsm_model.model import Attention, WorldSlamModel
+from wsm_model.mot.transformer import parts_in_order
+from wsm_model.precision import Precision, matrices
 
 
 def start_ranks() -> torch.device:
@@ -33,15 +37,85 @@ def rank_and_world_size() -> tuple[int, int]:
     return (dist.get_rank(), dist.get_world_size()) if dist.is_initialized() else (0, 1)
 
 
-def shard_model(model: MixtureOfTransformers, device: torch.device) -> None:
-    """Shard every layer, and what is left, over all ranks; nothing to do in a process that is alone."""
+def build_model(
+    config: ModelConfig, attention: Attention, device: torch.device, *, precision: Precision, shard_ranks: int = 0
+) -> WorldSlamModel:
+    """A model with random weights, sharded where there are several ranks; its numbers are the same on any number.
+
+    Every rank draws the weights of one part of the model at a time and keeps its share: no host holds a whole model.
+
+    Args:
+        config: of the model.
+        attention: how its attention is evaluated.
+        device: of this rank.
+        precision: of its products. In bfloat16 the layers' matrices are gathered rounded, as autocast would round them,
+            and their gradients are summed in float32.
+        shard_ranks: ranks that weights are sharded over; between groups of so many they are replicated. 0: all.
+
+    Raises:
+        ConfigError: the ranks are no multiple of `shard_ranks`.
+    """
     _, world_size = rank_and_world_size()
     if world_size == 1:
-        return
-    mesh = init_device_mesh(device.type, (world_size,))
-    for layer in model.layers:
+        return WorldSlamModel(config, attention).to(device)
+    with torch.device("meta"):
+        model = WorldSlamModel(config, attention)
+    _shard(model, rank_mesh(device, shard_ranks), precision)
+    model.to_empty(device=device)
+    parameters = dict(model.named_parameters())
+    for part, module in parts_in_order(config):
+        for name, values in module.named_parameters():
+            put_share(parameters[f"{part}.{name}"], values.detach(), is_everywhere=True)
+    return model
+
+
+def rank_mesh(device: torch.device, shard_ranks: int = 0) -> DeviceMesh:
+    """All ranks in a row, or in rows of `shard_ranks` (HSDP): weights are sharded along a row.
+
+    Raises:
+        ConfigError: the ranks do not fill the rows.
+    """
+    _, world_size = rank_and_world_size()
+    if not shard_ranks:
+        return init_device_mesh(device.type, (world_size,))
+    if world_size % shard_ranks:
+        raise ConfigError(f"training.shard_ranks must divide the {world_size} ranks, found {shard_ranks}")
+    return init_device_mesh(device.type, (world_size // shard_ranks, shard_ranks), mesh_dim_names=("copy", "shard"))
+
+
+def _shard(model: WorldSlamModel, mesh: DeviceMesh, precision: Precision) -> None:
+    """Every layer is gathered as a whole, its rounded matrices apart from what stays in float32."""
+    rounded = {name.rpartition(".")[0] for name in matrices(model)} if precision is Precision.BFLOAT16 else set()
+    policy = MixedPrecisionPolicy(param_dtype=torch.bfloat16, reduce_dtype=torch.float32, cast_forward_inputs=False)
+    for number, layer in enumerate(model.layers):
+        own = [module for name, module in layer.named_modules() if f"layers.{number}.{name}" in rounded]
+        if own:
+            fully_shard(own, mesh=mesh, mp_policy=policy)
         fully_shard(layer, mesh=mesh)
     fully_shard(model, mesh=mesh)
+
+
+@torch.no_grad()
+def put_share(parameter: Tensor, values: Tensor, *, is_everywhere: bool) -> None:
+    """Fill what this rank keeps of a parameter.
+
+    Args:
+        parameter: sharded or not.
+        values: all of it, of its shape.
+        is_everywhere: whether every rank has the values, so that nothing is sent; otherwise the first rank has, and
+            what the others give is not looked at.
+    """
+    if isinstance(parameter, DTensor):
+        source = None if is_everywhere else 0
+        shared = distribute_tensor(
+            values.to(parameter.device, parameter.dtype),
+            parameter.device_mesh,
+            parameter.placements,
+            src_data_rank=source,
+        )
+        parameter.to_local().copy_(shared.to_local())
+    else:
+        parameter.copy_(values)
 
 
 @contextmanager

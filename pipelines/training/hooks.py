@@ -1,5 +1,6 @@
 """What a run tells and draws on its way: metrics, progress bar, pictures, and errors on held-out clips."""
 
+import json
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from itertools import islice
@@ -23,6 +24,7 @@ from wsm_model.ranks import rank_and_world_size, wait_for_all, whole_model
 from wsm_model.training.average import averaged
 from wsm_model.training.loop import Hooks
 from wsm_model.training.metrics import MetricsWriter, metrics_writer
+from wsm_model.training.profile import profiled
 
 
 @contextmanager
@@ -43,12 +45,18 @@ def run_hooks(
         def unheard(step: int, values: Mapping[str, float]) -> None:
             """Metrics are the first rank's to write."""
 
-        sample = _sampler(config, out, started, device, unheard)
-        yield Hooks(metrics=unheard, sample=sample, progress=lambda _done: None, must_stop=must_stop)
+        yield Hooks(
+            metrics=unheard,
+            sample=_sampler(config, out, started, device, unheard),
+            evaluate=_evaluator(config, out, started, device, unheard),
+            progress=lambda _done: None,
+            must_stop=must_stop,
+        )
         return
     peak_tflops = world_size * config.hardware.peak_tflops
     with (
         metrics_writer(out, done) as write,
+        profiled(out / "profile", config.training.profile_steps) as tick,
         tqdm(
             total=started.card.steps, initial=done, unit="step", desc="train", disable=quiet, dynamic_ncols=True
         ) as bar,
@@ -61,9 +69,15 @@ def run_hooks(
 
         def progress(now: int) -> None:
             bar.update(now - bar.n)
+            tick()
 
-        sample = _sampler(config, out, started, device, write)
-        yield Hooks(metrics=show, sample=sample, progress=progress, must_stop=must_stop)
+        yield Hooks(
+            metrics=show,
+            sample=_sampler(config, out, started, device, write),
+            evaluate=_evaluator(config, out, started, device, write),
+            progress=progress,
+            must_stop=must_stop,
+        )
 
 
 def with_mfu(values: Mapping[str, float], peak_tflops: float) -> dict[str, float]:
@@ -83,8 +97,8 @@ def progress_words(values: Mapping[str, float]) -> dict[str, str]:
     }
 
 
-def evaluate_whole(config: TrainRunConfig, out: Path, model: WorldSlamModel, device: torch.device, quiet: bool) -> str:
-    """Errors of a whole model on held-out clips, shared among the ranks and written by the first.
+def evaluate_whole(config: TrainRunConfig, path: Path, model: WorldSlamModel, device: torch.device, quiet: bool) -> str:
+    """Errors of a whole model on held-out clips, shared among the ranks and written to `path` by the first.
 
     Returns:
         The table of means on the first rank; empty elsewhere, and where there are no such clips.
@@ -97,7 +111,7 @@ def evaluate_whole(config: TrainRunConfig, out: Path, model: WorldSlamModel, dev
             model,
             loader,
             config.held_out,
-            out / "evaluation.json",
+            path,
             decoding=decoding(config),
             shift=config.training.loss.flow_shift,
             quiet=quiet,
@@ -149,6 +163,23 @@ def _sampler(
         wait_for_all()
 
     return sample
+
+
+def _evaluator(
+    config: TrainRunConfig, out: Path, started: StartedRun, device: torch.device, write: MetricsWriter
+) -> Callable[[int], None]:
+    """What measures all held-out clips after a step, as at the end, and adds the means to the curves."""
+    rank, _ = rank_and_world_size()
+
+    def measure(step: int) -> None:
+        path = out / "evaluations" / f"step-{step:06d}.json"
+        with averaged(started.model, started.run.average), whole_model(started.model) as model:
+            evaluate_whole(config, path, model, device, quiet=True)
+        if rank == 0 and path.is_file():
+            write(step, curve_values(json.loads(path.read_text())))
+        wait_for_all()
+
+    return measure
 
 
 def _first_held_out(config: TrainRunConfig, device: torch.device) -> list[Batch]:

@@ -5,9 +5,11 @@ RUN/metrics.jsonl       a line per logged step
 RUN/tensorboard/        the same for TensorBoard
 RUN/checkpoints/        step-000500/ ..., and model.json, which says what their weights are
 RUN/ledger/             which step saw which clip
+RUN/profile/            a trace of some steps, where it is asked for
 RUN/samples/            dreams and estimates beside the truth
 RUN/curves.png
 RUN/model/              model.safetensors and model.json, at the end
+RUN/evaluations/        errors on held-out clips on the way, where they are asked for
 RUN/evaluation.json     errors on held-out clips, at the end
 """
 
@@ -30,6 +32,7 @@ from pipelines.training.start import StartedRun, start_run, with_standard
 from wsm_data.files.atomic import write_text
 from wsm_data.loaders.loader import ClipLoader
 from wsm_model.model_file import save_card, save_model
+from wsm_model.mot.compiled import compile_blocks
 from wsm_model.ranks import leave_ranks, rank_and_world_size, start_ranks, wait_for_all, whole_model
 from wsm_model.training.average import averaged
 from wsm_model.training.initial import CHECKPOINTS, MODEL
@@ -75,7 +78,7 @@ def _run(config: TrainRunConfig, out: Path, device: torch.device, quiet: bool) -
         if rank == 0:
             draw_curves(out)
         with whole_model(started.model) as model:
-            table = evaluate_whole(config, out, model, device, quiet)
+            table = evaluate_whole(config, out / "evaluation.json", model, device, quiet)
     return None if rank else table
 
 
@@ -94,6 +97,8 @@ def _train(
         run_hooks(config, out, started, done=done, device=device, quiet=quiet, must_stop=must_stop) as hooks,
     ):
         model.checkpoint_activations = config.training.checkpoint_activations
+        if config.training.compile:
+            compile_blocks(model)
         model.train()
         step = partial(pretraining_step, model, run, config.training)
         train(run, step, loader, config.training, hooks=hooks, done=done)

@@ -22,7 +22,7 @@ from wsm_data.shards.manifest import ReleaseManifest
 from wsm_model.config import ModelConfig
 from wsm_model.model import WorldSlamModel
 from wsm_model.model_file import CARD_FILE, ModelCard, load_card
-from wsm_model.ranks import rank_and_world_size, shard_model
+from wsm_model.ranks import build_model, rank_and_world_size
 from wsm_model.training.average import start_average
 from wsm_model.training.checkpoint import checkpoints
 from wsm_model.training.initial import CHECKPOINTS, InitialWeights, fill_from, find_initial, require_shape
@@ -37,7 +37,11 @@ _NOT_PART_OF_A_RUN = (
     "keep_checkpoints",
     "log_every",
     "sample_every",
+    "evaluate_every",
+    "shard_ranks",
     "micro_rows",
+    "compile",
+    "profile_steps",
 )
 """Settings of training that may change between two parts of a run: none of them changes what a step learns.
 
@@ -86,13 +90,16 @@ def start_run(config: TrainRunConfig, out: Path, loader: ClipLoader, device: tor
     """
     release = loader.sources.tables[0].release
     torch.manual_seed(config.training.seed)
-    model = WorldSlamModel(model_config(config, release.manifest), config.model.attention).to(device)
-    standard = config.read.standard or latent_standard(release.manifest)
+    shape = model_config(config, release.manifest)
     is_new = not checkpoints(out / CHECKPOINTS)
-    initial = _initial(config, model.config, release.manifest) if is_new else None
+    initial = _initial(config, shape, release.manifest) if is_new else None
+    training = config.training
+    model = build_model(
+        shape, config.model.attention, device, precision=training.precision, shard_ranks=training.shard_ranks
+    )
+    standard = config.read.standard or latent_standard(release.manifest)
     if config.model.weights and is_new:
         _fill_with_wan(config, out, model)
-    shard_model(model, device)
     if initial is not None:
         fill_from(model, initial)
     run = TrainingRun(

@@ -1,6 +1,6 @@
 """The three experts: their ends, and the layers they share."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import cast
 
 import torch
@@ -52,6 +52,18 @@ class MixtureOfTransformers(nn.Module):
             else:
                 tokens = layer(tokens, streams, attend, context)
         return {expert: stream.with_tokens(tokens[expert]) for expert, stream in streams.items()}
+
+
+def parts_in_order(config: ModelConfig) -> Iterator[tuple[str, nn.Module]]:
+    """The parts of a model one after another with their names, as its constructor makes them, from the same numbers.
+
+    Whoever takes them one by one needs the memory of a single part.
+    """
+    for expert in config.experts:
+        yield f"experts.{expert.value}", ExpertEnds(config, expert)
+    for number in range(config.layers):
+        yield f"layers.{number}", JointLayer(config, number)
+    yield "goal", GoalEmbedding(config.goal_frequencies, config.goal_base_rad_per_m, config.generation.width)
 
 
 def expert_of_parameter(name: str) -> Expert | None:

@@ -35,6 +35,8 @@ from wsm_model.ranks import rank_and_world_size, wait_for_all
 _STATE = "state.json"
 _FOLDER = re.compile(r"step-(\d{6,})")
 _MOMENTS = ("exp_avg", "exp_avg_sq")
+_FILE_BYTES = 1 << 30
+"""Of a rank, in one file of a checkpoint."""
 NOTHING: Mapping[str, Tensor] = MappingProxyType({})
 """Averaged weights of a run that keeps none."""
 
@@ -83,9 +85,12 @@ def save_checkpoint(
         shutil.rmtree(path, ignore_errors=True)  # what a killed run left
         path.mkdir(parents=True)
     wait_for_all()
-    writer = HuggingFaceStorageWriter(str(path), save_distributed=True)
+    tensors = _tensors(model, optimiser, average)
+    writer = HuggingFaceStorageWriter(
+        str(path), fqn_to_index_mapping=_files_of(tensors, world_size), save_distributed=True
+    )
     with _quiet_alone(), _causes_raised():
-        save(_tensors(model, optimiser, average), storage_writer=writer, no_dist=world_size == 1)
+        save(tensors, storage_writer=writer, no_dist=world_size == 1)
     wait_for_all()
     own = {file.name: xxh3_128_file(file) for file in sorted(path.glob("*.safetensors"))[rank::world_size]}
     write_text(path / f"digests-{rank:05d}.json", canonical_json(own) + "\n")
@@ -230,6 +235,18 @@ def _tensors(model: nn.Module, optimiser: torch.optim.Optimizer, average: Mappin
             if moment in optimiser.state[parameter]:
                 tensors[f"optimiser.{moment}.{name}"] = optimiser.state[parameter][moment]
     return tensors
+
+
+def _files_of(tensors: Mapping[str, Tensor], world_size: int) -> dict[str, int]:
+    """The file of each tensor, from 1: a rank holds copies of one file's content while it writes, not of everything."""
+    files: dict[str, int] = {}
+    number, filled = 1, 0
+    for name, tensor in tensors.items():
+        size = tensor.numel() * tensor.element_size() // world_size
+        if filled and filled + size > _FILE_BYTES:
+            number, filled = number + 1, 0
+        files[name], filled = number, filled + size
+    return files
 
 
 def _prepare_moments(model: nn.Module, optimiser: torch.optim.Optimizer, step: int) -> None:

@@ -65,6 +65,7 @@ class LoopConfig:
         keep_checkpoints: how many of the latest stay on disk.
         log_every: optimiser steps between lines of metrics.
         sample_every: optimiser steps between pictures; 0: none.
+        evaluate_every: optimiser steps between evaluations on all held-out clips, beside that at the end; 0: none.
     """
 
     epochs: int = 10
@@ -74,12 +75,13 @@ class LoopConfig:
     keep_checkpoints: int = 2
     log_every: int = 1
     sample_every: int = 0
+    evaluate_every: int = 0
 
     def __post_init__(self) -> None:
         for name in ("epochs", "checkpoint_every", "keep_checkpoints", "log_every"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} must be at least 1, found {getattr(self, name)}")
-        for name in ("max_steps", "sample_every"):
+        for name in ("max_steps", "sample_every", "evaluate_every"):
             if getattr(self, name) < 0:
                 raise ValueError(f"{name} must not be negative, found {getattr(self, name)}")
 
@@ -93,6 +95,10 @@ class TrainingConfig(LoopConfig):
         seed: of initial weights, noise and flow times.
         precision: arithmetic of matrix products.
         checkpoint_activations: recompute each layer in the backward pass instead of keeping what is inside it.
+        shard_ranks: ranks that weights, gradients and moments are sharded over, such as those of one machine; groups of
+            so many hold copies of one another. 0: all ranks.
+        compile: whether blocks are compiled, which takes a minute or two and saves time in every step.
+        profile_steps: steps of which a trace is recorded on the first rank, after three that are not; 0: none.
         depth_noise: largest share s of noise eps in the depth latents d that later chunks see: of each sequence a
             share is drawn uniformly up to it, and they see (1 - s) d + s eps. In use they see estimates, which are not
             the truth (paper silent; 0: the truth, its teacher forcing).
@@ -105,6 +111,9 @@ class TrainingConfig(LoopConfig):
     seed: int = 0
     precision: Precision = Precision.BFLOAT16
     checkpoint_activations: bool = False
+    shard_ranks: int = 0
+    compile: bool = False
+    profile_steps: int = 0
     depth_noise: float = 0.0
     ema_decay: float = 0.0
     loss: LossConfig = field(default_factory=LossConfig)
@@ -115,6 +124,6 @@ class TrainingConfig(LoopConfig):
             raise ValueError(f"ema_decay must lie in [0, 1), found {self.ema_decay}")
         if not 0 <= self.depth_noise <= 1:
             raise ValueError(f"depth_noise must lie in [0, 1], found {self.depth_noise}")
-        for name in ("micro_rows", "seed"):
+        for name in ("micro_rows", "seed", "profile_steps", "shard_ranks"):
             if getattr(self, name) < 0:
                 raise ValueError(f"{name} must not be negative, found {getattr(self, name)}")

@@ -69,6 +69,7 @@ class Hooks:
     Attributes:
         metrics: takes the numbers of a step; called on the first rank.
         sample: draws pictures after a step; called on every rank.
+        evaluate: measures held-out clips after a step; called on every rank.
         progress: takes the number of steps done, on the first rank.
         must_stop: asked after every step whether to save and end now; on every rank, and one is enough.
     """
@@ -77,6 +78,7 @@ class Hooks:
     sample: Callable[[int], None]
     progress: Callable[[int], None]
     must_stop: Callable[[], bool]
+    evaluate: Callable[[int], None] = lambda _step: None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -164,6 +166,8 @@ def train(
                     hooks.metrics(done, _told(result, rate, time.perf_counter() - started_s, waited_s))
             if config.sample_every and done % config.sample_every == 0:
                 hooks.sample(done)
+            if config.evaluate_every and done % config.evaluate_every == 0:
+                hooks.evaluate(done)
             stops = any_rank(hooks.must_stop())
             if done % config.checkpoint_every == 0 or is_last or stops:
                 path = save_checkpoint(

@@ -17,6 +17,7 @@ from wsm_data.errors import ConfigError
 from wsm_model.config import Expert
 from wsm_model.layers.time_embedding import MODULATIONS
 from wsm_model.mot.transformer import MixtureOfTransformers, expert_of_parameter
+from wsm_model.ranks import put_share, rank_and_world_size
 from wsm_model.weights.interpolation import resize_tensor
 from wsm_model.weights.wan_names import is_unused, our_name
 
@@ -50,8 +51,10 @@ class WeightsReport:
 def load_wan_weights(model: MixtureOfTransformers, folder: str | Path) -> WeightsReport:
     """Fill the experts: generation takes the weights over, depth and pose take them at their own width.
 
+    The first rank reads and resizes one tensor after another, and hands every other its share.
+
     Args:
-        model: on any device but meta.
+        model: on any device but meta; sharded or not.
         folder: the `transformer` folder of the diffusers layout, or the folder of the original checkpoint.
 
     Raises:
@@ -61,7 +64,8 @@ def load_wan_weights(model: MixtureOfTransformers, folder: str | Path) -> Weight
     copied: set[str] = set()
     resized: dict[str, tuple[tuple[int, ...], tuple[int, ...]]] = {}
     unused: set[str] = set()
-    for name, tensor in _tensors(Path(folder)):
+    rank, _ = rank_and_world_size()
+    for name, tensor in _tensors(Path(folder), is_read=rank == 0):
         inner = None if is_unused(name) else our_name(name)
         targets = [] if inner is None else _targets(parameters, inner)
         if not targets:
@@ -102,6 +106,8 @@ def _as_ours(tensor: Tensor, inner: str) -> Tensor:
 
 def _write(parameter: nn.Parameter, source: Tensor, name: str) -> None:
     target_shape = _shape(parameter)
+    if source.is_meta:  # another rank has the values
+        source = torch.empty(target_shape, device=parameter.device)
     if _shape(source) != target_shape:
         if ".time.projection." in name:  # six vectors side by side: each is resized by itself
             parts = source.unflatten(0, (MODULATIONS, -1))
@@ -109,8 +115,7 @@ def _write(parameter: nn.Parameter, source: Tensor, name: str) -> None:
             source = resize_tensor(parts, wanted, 2 if len(wanted) == 3 else None).flatten(0, 1)
         else:
             source = resize_tensor(source, target_shape, 1 if name.endswith("weight") and source.dim() == 2 else None)
-    with torch.no_grad():
-        parameter.copy_(source)
+    put_share(parameter, source, is_everywhere=False)
 
 
 def _require_width_of_state_expert(target: str, source: Tensor, parameter: nn.Parameter, name: str) -> None:
@@ -132,12 +137,16 @@ def _require_whole(parameters: Mapping[str, nn.Parameter], filled: set[str], fol
         )
 
 
-def _tensors(folder: Path) -> Iterator[tuple[str, Tensor]]:
+def _tensors(folder: Path, *, is_read: bool) -> Iterator[tuple[str, Tensor]]:
+    """Tensors by name; of those that are not read the shape alone."""
     for path in _files(folder):
         try:
             with safe_open(path, framework="pt") as file:
                 for name in file.keys():  # noqa: SIM118 - safe_open is no mapping
-                    yield name, file.get_tensor(name)
+                    if is_read:
+                        yield name, file.get_tensor(name)
+                    else:
+                        yield name, torch.empty(file.get_slice(name).get_shape(), device="meta")
         except (SafetensorError, OSError) as error:
             raise ConfigError(f"{path} must be a whole safetensors file, but: {error}; fetch it again") from error
 

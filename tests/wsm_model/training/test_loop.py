@@ -15,6 +15,7 @@ CONFIG = LoopConfig(
     max_steps=5,
     checkpoint_every=2,
     sample_every=2,
+    evaluate_every=3,
     log_every=2,
     optimiser=OptimiserConfig(learning_rate=1e-2, final_learning_rate=1e-2),
 )
@@ -47,7 +48,7 @@ def run_of(folder) -> TrainingRun:
 
 def trained(run: TrainingRun, bad_step: int = 0, told_to_end_at: int = 0):
     """Weights at the end, and what was seen and told on the way."""
-    told = {"batches": [], "metrics": [], "sample": [], "progress": []}
+    told = {"batches": [], "metrics": [], "sample": [], "evaluate": [], "progress": []}
 
     def step(number: int) -> StepResult:
         told["batches"].append(number)
@@ -59,6 +60,7 @@ def trained(run: TrainingRun, bad_step: int = 0, told_to_end_at: int = 0):
     hooks = Hooks(
         metrics=lambda step, values: told["metrics"].append((step, values["learning_rate"])),
         sample=told["sample"].append,
+        evaluate=told["evaluate"].append,
         progress=told["progress"].append,
         must_stop=lambda: told["batches"][-1] == told_to_end_at,
     )
@@ -72,6 +74,7 @@ def test_any_step_is_taken_told_and_kept(tmp_path):
     assert told["batches"] == told["progress"] == [1, 2, 3, 4, 5]
     assert told["metrics"] == [(2, 1e-2), (4, 1e-2), (5, 1e-2)]
     assert told["sample"] == [2, 4]
+    assert told["evaluate"] == [3]
     assert [path.name for path in checkpoints(tmp_path)] == ["step-000004", "step-000005"]
 
 
