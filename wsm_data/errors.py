@@ -78,6 +78,7 @@ class Reason(StrEnum):
     POSE_JUMP = "pose.jump"
     POSE_MOTION_DISAGREE = "pose.motion_disagree"  # poses stand still, or jump, where depth images do not
     POSE_DEPTH_DISAGREE = "pose.depth_disagree"
+    POSE_OUT_OF_STEP = "pose.out_of_step"  # depth fits the poses of some frames earlier or later better
     INTRINSICS_MISFIT = "intrinsics.misfit"
     MOUNT_MISFIT = "mount.misfit"
     MOUNT_FLOOR_DISAGREE = "mount.floor_disagree"  # depth images see the floor at another height

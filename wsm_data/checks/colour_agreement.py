@@ -10,8 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wsm_data.checks.depth_pairs import lattice_rays
 from wsm_data.errors import Reason
-from wsm_data.geometry.camera import pixel_rays, project
+from wsm_data.geometry.camera import project
 from wsm_data.geometry.transform import invert, transform_points
 from wsm_data.schema.arrays import Float32Array, Float64Array, Int64Array
 from wsm_data.schema.episode import EpisodeRecord
@@ -107,6 +108,8 @@ def _blank(record: EpisodeRecord, blank: Sequence[int], spread: Mapping[int, flo
 def _better(green: Float32Array, seen: Sequence[_Seen], own: Mapping[int, float]) -> tuple[str, float]:
     """What the images would have to be to fit clearly better, and by how much; the empty text where nothing does."""
     best, gained = "", 0.0
+    if 2 * sum(value <= 1 - BETTER_BY for value in own.values()) < LEAST_STEPS:
+        return best, gained  # no correlation exceeds 1, so that too few pairs could gain as much
     for name, (other, frames) in _alternatives(green).items():
         others = {at: _correlation(other, seen[at], frames) for at in own}
         gains = [value - own[at] for at, value in others.items() if value is not None]
@@ -150,7 +153,7 @@ def _seen_in_both(
     lattice_m = depth_m[a][::stride, ::stride].astype(np.float64)
     rows, columns = np.nonzero(lattice_m > 0)
     own = np.stack([columns, rows], axis=1) * stride
-    points_m = (pixel_rays(intrinsics)[::stride, ::stride] * lattice_m[..., None])[rows, columns]
+    points_m = (lattice_rays(intrinsics, stride) * lattice_m[..., None])[rows, columns]
     T_b_a = invert(record.T_world_camera[b]) @ record.T_world_camera[a]
     pixels, ahead_m = project(transform_points(T_b_a, points_m), intrinsics)
     column, row = np.rint(pixels).T

@@ -56,10 +56,13 @@ CLEAR_ERROR = 2.0
 noise and poses that jitter, 7 % of the points, at slanted surfaces, prefer them by chance and err by one limit;"""
 
 MIN_VOTES = 2 / 3
-"""and so large a share of these pairs is for it: the error of one pose is in two pairs at most, a slip is in all."""
+"""and so large a share of these pairs is for it: the error of one pose is in two pairs at most."""
 
-MAX_OFFSET_FRAMES = 3
-"""Poses up to so many frames earlier and later are held against the images too."""
+MAX_MEANING_PAIRS = 12
+"""Other meanings are tried in so many of the pairs at most, since one that is right is so in all of them;"""
+
+SHIFTED_FRAMES = 3
+"""and in all pairs poses of so many frames before and after, which differ in every direction from poses that drift."""
 
 
 def check_depth_agreement(
@@ -74,10 +77,9 @@ def check_depth_agreement(
     Depth of a frame is unprojected, moved into another frame by the poses, and compared with the depth there. Refused
     is a median error over the limit, over the points that can tell (see the module); and poses that do not fit where
     another meaning of them does, and errs by half at most (noise alone prefers none by that much), over the points that
-    tell these two apart: other camera axes, a camera that looks backwards, inverse matrices, poses of a few frames
-    earlier or later, depth in another unit. A pair with too few such points tells nothing,
-    and a trajectory of such pairs alone is kept, with `pairs` = 0. What the geometry hides cannot be refused: straight
-    driving at constant speed shows no time offset.
+    tell these two apart: other camera axes, a camera that looks backwards, inverse matrices, poses of some frames
+    earlier or later, depth in another unit. A
+    pair with too few such points tells nothing, and a trajectory of such pairs alone is kept, with `pairs` = 0.
 
     Args:
         record: the trajectory.
@@ -90,15 +92,13 @@ def check_depth_agreement(
             to 820 mm: manifests/datasets/interndata_n1.toml, camera_axes.
     """
     compared = [depth_pair(a, b, depth_m, record.intrinsics, MAX_POINTS) for a, b in pairs]
-    own = [_errors(record, record.T_world_camera, pair) for pair in compared]
-    median, used = _median_error(record, compared, own, max_error)
+    median, used = _median_error(record, compared, max_error)
     meanings = _meanings(record.T_world_camera @ invert(T_STORED_OPENCV[camera_axes]))
-    meanings |= _rescaled(record.T_world_camera)
-    errors = {name: _against(record, poses, compared, own, max_error) for name, poses in meanings.items()}
-    for name, poses in _shifted(record.T_world_camera).items():
-        mine, other, share = _against(record, poses, compared, own, max_error)
-        clear = share >= LARGE_DECIDING_SHARE or mine >= CLEAR_ERROR * max_error
-        errors[name] = (mine, other, share) if clear else (math.nan, math.nan, 0.0)
+    few = compared[:: max(1, -(-len(compared) // MAX_MEANING_PAIRS))]
+    errors = _against_own(record, meanings | _rescaled(record.T_world_camera), few, max_error)
+    for name, tried in _against_own(record, _shifted(record.T_world_camera), compared, max_error).items():
+        clear = tried[2] >= LARGE_DECIDING_SHARE or tried[0] >= CLEAR_ERROR * max_error
+        errors[name] = tried if clear else (math.nan, math.nan, 0.0)
     better = {
         name: other
         for name, (mine, other, share) in errors.items()
@@ -132,7 +132,7 @@ def _advice(fits: str | None) -> str:
     if fits in _DEPTH_SCALES:
         return f"they would agree if {fits}: correct depth.metres_per_unit of the manifest"
     if fits.startswith(_SHIFTED):
-        remedy = "they are out of step with the images; move one against the other in the source"
+        remedy = "they drift, or are out of step with the images; repair the source"
     elif fits.startswith(_INVERTED):
         remedy = "invert them in the source"
     else:
@@ -157,14 +157,13 @@ def _meanings(T_world_stored: Float64Array) -> dict[str, Float64Array]:
 
 
 def _shifted(T_world_camera: Float64Array) -> dict[str, Float64Array]:
-    """Poses out of step: the image of frame t has the pose of a frame before or after it; NaN where there is none."""
-    shifted = {}
-    for n in range(1, MAX_OFFSET_FRAMES + 1):
-        frames = "1 frame" if n == 1 else f"{n} frames"
-        missing = np.full((min(n, len(T_world_camera)), 4, 4), np.nan)
-        shifted[f"{_SHIFTED} {frames} later"] = np.concatenate([T_world_camera[n:], missing])
-        shifted[f"{_SHIFTED} {frames} earlier"] = np.concatenate([missing, T_world_camera[:-n]])
-    return shifted
+    """The image of frame t has the pose of a frame before or after it; NaN where there is none."""
+    n = min(SHIFTED_FRAMES, len(T_world_camera))
+    missing = np.full((n, 4, 4), np.nan)
+    return {
+        f"{_SHIFTED} {n} frames later": np.concatenate([T_world_camera[n:], missing]),
+        f"{_SHIFTED} {n} frames earlier": np.concatenate([missing, T_world_camera[:-n]]),
+    }
 
 
 def _rescaled(T_world_camera: Float64Array) -> dict[str, Float64Array]:
@@ -176,51 +175,47 @@ def _rescaled(T_world_camera: Float64Array) -> dict[str, Float64Array]:
     return rescaled
 
 
-def _errors(record: EpisodeRecord, T_world_camera: Float64Array, pair: DepthPair) -> Float64Array:
-    T_b_a = invert(T_world_camera[pair.b]) @ T_world_camera[pair.a]
-    return relative_errors(pair, T_b_a, record.intrinsics)
-
-
-def _median_error(
-    record: EpisodeRecord, pairs: Sequence[DepthPair], own: Sequence[Float64Array], max_error: float
-) -> tuple[float | None, int]:
+def _median_error(record: EpisodeRecord, pairs: Sequence[DepthPair], max_error: float) -> tuple[float | None, int]:
     """Median error over the points that can tell, of all pairs with enough of them, and the number of such pairs."""
     told = []
-    for pair, mine in zip(pairs, own, strict=True):
+    for pair in pairs:
         T_b_a = invert(record.T_world_camera[pair.b]) @ record.T_world_camera[pair.a]
-        still = relative_errors(pair, np.eye(4), record.intrinsics)
-        back = relative_errors(pair, _HALF_TURN @ T_b_a @ _HALF_TURN, record.intrinsics)
+        motions = np.stack([T_b_a, np.eye(4), _HALF_TURN @ T_b_a @ _HALF_TURN])
+        mine, still, back = relative_errors(pair, motions, record.intrinsics)
         tells = _differ(mine, still, max_error) | _differ(mine, back, max_error)
         if _enough(tells, mine):
             told.append(np.abs(mine[tells]))
     return (float(np.median(np.concatenate(told))) if told else None), len(told)
 
 
-def _against(
-    record: EpisodeRecord,
-    T_world_camera: Float64Array,
-    pairs: Sequence[DepthPair],
-    own: Sequence[Float64Array],
-    max_error: float,
-) -> tuple[float, float, float]:
-    """Median errors of a record's own poses and of others, over the points that tell them apart, and their share.
+def _against_own(
+    record: EpisodeRecord, meanings: Mapping[str, Float64Array], pairs: Sequence[DepthPair], max_error: float
+) -> dict[str, tuple[float, float, float]]:
+    """By meaning, the median errors of a record's own poses and of these, and the share of points that tell them apart.
 
     NaN where these are too few, or pairs do not tell the same.
     """
-    told = []
-    seen = sum(np.count_nonzero(np.isfinite(mine)) for mine in own)
-    for pair, mine in zip(pairs, own, strict=True):
-        other = _errors(record, T_world_camera, pair)
-        tells = _differ(mine, other, max_error)
-        if _enough(tells, mine):
-            told.append(np.abs([mine[tells], other[tells]]))
+    told: dict[str, list[Float64Array]] = {name: [] for name in meanings}
+    seen = 0
+    for pair in pairs:
+        every = np.stack([record.T_world_camera, *meanings.values()])
+        mine, *others = relative_errors(pair, invert(every[:, pair.b]) @ every[:, pair.a], record.intrinsics)
+        seen += np.count_nonzero(np.isfinite(mine))
+        for name, other in zip(meanings, others, strict=True):
+            tells = _differ(mine, other, max_error)
+            if _enough(tells, mine):
+                told[name].append(np.abs([mine[tells], other[tells]]))
+    return {name: _decided(one, seen) for name, one in told.items()}
+
+
+def _decided(told: Sequence[Float64Array], seen: int) -> tuple[float, float, float]:
+    """Median errors [own, other] over pairs of [2, N] errors of the points that tell, and their share of those seen."""
     if not told:
         return math.nan, math.nan, 0.0
     votes = np.mean([np.median(mine) > np.median(other) for mine, other in told])
     both = np.concatenate(told, axis=1)
     least = MIN_DECIDING_SHARE if len(told) >= MIN_DECIDING_PAIRS else LARGE_DECIDING_SHARE
-    decides = both.shape[1] >= least * seen
-    if not decides or votes < MIN_VOTES:
+    if both.shape[1] < least * seen or votes < MIN_VOTES:
         return math.nan, math.nan, 0.0
     mine_median, other_median = np.median(both, axis=1).tolist()
     return mine_median, other_median, both.shape[1] / seen

@@ -8,18 +8,19 @@ import numpy as np
 from wsm_data.checks.cloud_agreement import check_cloud_agreement, height_bands
 from wsm_data.checks.colour_agreement import check_colour_agreement
 from wsm_data.checks.depth_motion import check_depth_motion
+from wsm_data.checks.depth_pairs import lattice_rays
 from wsm_data.checks.images.cloud_alignment import check_cloud_alignment
 from wsm_data.checks.images.depth_values import check_depth_values
 from wsm_data.checks.images.floor_level import check_floor_level
 from wsm_data.checks.images.frame_order import check_frame_order
 from wsm_data.checks.images.frames_repeat import check_frames_repeat
 from wsm_data.checks.images.frames_shown import check_frames_shown
+from wsm_data.checks.images.time_offset import check_time_offset
 from wsm_data.clips.build import ClipVideos, read_videos
 from wsm_data.clips.config import ClipConfig
 from wsm_data.clips.depth_gate import DepthSamples, check_samples, sample_depth
 from wsm_data.clips.path_on_floor import PathOnFloor
 from wsm_data.codecs.clip_video import VideoMemory
-from wsm_data.geometry.camera import pixel_rays
 from wsm_data.geometry.transform import transform_points
 from wsm_data.maps.scene_map import SceneMap
 from wsm_data.schema.arrays import Float64Array
@@ -72,7 +73,9 @@ def check_episode(
         "colour_agreement": _check_colour(record, videos, samples, dataset),
     }
     if videos.depth is not None:
-        verdicts["depth_order"] = check_frame_order(videos.depth[: record.frame_count, ..., 0], "depth", where)
+        depth = videos.depth[: record.frame_count, ..., 0]
+        verdicts["depth_order"] = check_frame_order(depth, "depth", where)
+        verdicts["time_offset"] = check_time_offset(record, depth, config.depth_range)
     if points_m and dataset.motion.carried_by == CarriedBy.ROBOT:  # a hand's floor was found in depth itself
         verdicts["floor_level"] = _check_floor(record, points_m)
     return verdicts, videos
@@ -141,6 +144,5 @@ def _camera_points(record: EpisodeRecord, samples: DepthSamples) -> dict[int, Fl
     for number, depth_m in samples.depth_m.items():
         stride = int(np.ceil(np.sqrt(depth_m.size / POINTS_PER_FRAME)))
         lattice_m = depth_m[::stride, ::stride].astype(np.float64)
-        rays = pixel_rays(record.intrinsics)[::stride, ::stride]
-        points_m[number] = (rays * lattice_m[..., None])[lattice_m > 0]
+        points_m[number] = (lattice_rays(record.intrinsics, stride) * lattice_m[..., None])[lattice_m > 0]
     return points_m

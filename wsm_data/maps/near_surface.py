@@ -31,7 +31,7 @@ def _near(
 ) -> BoolArray:
     near = np.zeros(len(points_m), np.bool_)
     for i in range(len(points_m)):
-        x, y, z = points_m[i]
+        x, y, z = points_m[i, 0], points_m[i, 1], points_m[i, 2]
         lowest = np.floor((z - reach_m) / LAYER_HEIGHT_M)
         highest = np.floor((z + reach_m) / LAYER_HEIGHT_M)
         column0 = max(int(np.floor((x - reach_m) / CELL_SIZE_M)) - origin_cell[0], 0)
@@ -40,6 +40,8 @@ def _near(
         row1 = min(int(np.floor((y + reach_m) / CELL_SIZE_M)) - origin_cell[1], shape[0] - 1)
         for row in range(row0, row1 + 1):
             for column in range(column0, column1 + 1):
+                if near[i]:
+                    break
                 cell = row * shape[1] + column
                 for box in range(first[cell], first[cell + 1]):
                     if lowest <= layers[box] <= highest:

@@ -39,7 +39,8 @@ def test_sound_trajectories_have_a_verdict_of_every_check_with_numbers_and_limit
             *("length", "intrinsics_fit", "mount", "pose_jump"),
             *("frames_repeat", "frames_shown", "colour_order", "depth_share", "depth_steps", "depth_noise"),
             *("depth_agreement", "cloud_agreement", "cloud_alignment", "path_shown", "expert_path"),
-            *("depth_motion", "colour_agreement", "depth_order", "floor_level", "reachability", "goal_reached"),
+            *("depth_motion", "colour_agreement", "depth_order", "time_offset", "floor_level"),
+            *("reachability", "goal_reached"),
         ]
         assert all(verdict.measured for verdict in unit.verdicts.values())
         assert unit.frames >= 10

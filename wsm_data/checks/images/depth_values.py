@@ -71,5 +71,5 @@ def _relative_noise(rows_m: Float64Array) -> float:
 
 def _step_m(rows_m: Float64Array, metres_per_unit: float) -> tuple[float, int]:
     """The largest step that all codes are multiples of, m, and how many different codes there are."""
-    codes = np.unique(np.rint(rows_m[rows_m > 0] / metres_per_unit).astype(np.int64))
+    codes = np.flatnonzero(np.bincount(np.rint(rows_m[rows_m > 0] / metres_per_unit).astype(np.int64)))
     return float(np.gcd.reduce(codes)) * metres_per_unit if len(codes) else 0.0, len(codes)
