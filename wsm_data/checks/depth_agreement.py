@@ -96,9 +96,9 @@ def check_depth_agreement(
     meanings = _meanings(record.T_world_camera @ invert(T_STORED_OPENCV[camera_axes]))
     few = compared[:: max(1, -(-len(compared) // MAX_MEANING_PAIRS))]
     errors = _against_own(record, meanings | _rescaled(record.T_world_camera), few, max_error)
-    for name, tried in _against_own(record, _shifted(record.T_world_camera), compared, max_error).items():
-        clear = tried[2] >= LARGE_DECIDING_SHARE or tried[0] >= CLEAR_ERROR * max_error
-        errors[name] = tried if clear else (math.nan, math.nan, 0.0)
+    for name, late in _against_own(record, _shifted(record.T_world_camera), compared, max_error).items():
+        clear = late[2] >= LARGE_DECIDING_SHARE or late[0] >= CLEAR_ERROR * max_error
+        errors[name] = late if clear else (math.nan, math.nan, 0.0)
     better = {
         name: other
         for name, (mine, other, share) in errors.items()
@@ -200,7 +200,7 @@ def _against_own(
     for pair in pairs:
         every = np.stack([record.T_world_camera, *meanings.values()])
         mine, *others = relative_errors(pair, invert(every[:, pair.b]) @ every[:, pair.a], record.intrinsics)
-        seen += np.count_nonzero(np.isfinite(mine))
+        seen += int(np.count_nonzero(np.isfinite(mine)))
         for name, other in zip(meanings, others, strict=True):
             tells = _differ(mine, other, max_error)
             if _enough(tells, mine):

@@ -20,6 +20,9 @@ MOVED_M = 0.02
 MOVED_RAD = 0.02
 """A camera that moved or turned so far has another image: noise alone makes two images of a sensor differ."""
 
+LONGEST_RUN = 3
+"""A sensor that falls behind hands out its last image again, once or twice; one that shows it longer is stuck."""
+
 MAX_POINTS, MIN_POINTS = 1600, 50
 MAX_ERROR = 0.003
 """Exact depth may repeat: over a floor without end, or along a bare wall, the motion itself leaves it as it is. Then
@@ -33,7 +36,7 @@ def check_frames_repeat(
     """Refuse a trajectory with images that are copies of others, by digest (`frame.repeated`).
 
     A camera that stands still may show the same again, so only those count between which the poses move; and of depth
-    images, those that the motion changes.
+    images, those that the motion changes. More than `LONGEST_RUN` in a row are refused whatever share is allowed.
 
     Args:
         record: the trajectory.
@@ -48,32 +51,43 @@ def check_frames_repeat(
     copies["depth"] = [(a, b) for a, b in copies["depth"] if not _unchanged(record, a, b, frames.depth[b], encoding)]
     shares = {kind: len(found) / record.frame_count for kind, found in copies.items()}
     worst = max(shares, key=lambda kind: shares[kind])
-    measured: dict[str, object] = {f"repeated_{kind}_share": share for kind, share in shares.items()}
-    limits = dict.fromkeys(measured, max_share)
-    if shares[worst] <= max_share:
+    run = max(_longest_run(found) for found in copies.values())
+    repeated: dict[str, object] = {f"repeated_{kind}_share": share for kind, share in shares.items()}
+    measured = {**repeated, "longest_run": run}
+    limits = {**dict.fromkeys(repeated, max_share), "longest_run": LONGEST_RUN}
+    if shares[worst] <= max_share and run <= LONGEST_RUN:
         return Verdict(measured=measured, limits=limits)
     first, again = copies[worst][0]
     message = (
         f"{record.id.text}: images must differ where the camera moved, and {len(copies[worst])} {worst} images are "
-        f"copies of others: the first is that of frame {again}, of frame {first}; fetch the source again, or leave "
-        "these out"
+        f"copies of others, up to {run} in a row are alike: the first is that of frame {again}, of frame {first}; "
+        "fetch the source again, or leave these out"
     )
     details = {**measured, "frame": again, "copy_of": first, "kind": worst}
     return Verdict(reason=Reason.FRAME_REPEATED, message=message, measured=details, limits=limits)
 
 
 def _copies(record: EpisodeRecord, images: Sequence[RgbFrame | DepthFrame | None]) -> list[tuple[int, int]]:
-    """Pairs of a frame and a later one with the same image, between which the camera moved."""
-    last: dict[str, int] = {}
+    """Pairs of the first frame with an image and a later one with the same, between which the camera moved."""
+    first: dict[str, int] = {}
     pairs = []
     for number, image in enumerate(images):
         if image is None:
             continue
         digest = xxh3_128(image if isinstance(image, bytes) else np.ascontiguousarray(image).tobytes())
-        if digest in last:
-            pairs.append((last[digest], number))
-        last[digest] = number
+        if digest in first:
+            pairs.append((first[digest], number))
+        first.setdefault(digest, number)
     return [(a, b) for a, b in pairs if _moved(record.T_world_camera[a], record.T_world_camera[b])]
+
+
+def _longest_run(copies: Sequence[tuple[int, int]]) -> int:
+    """How many images in a row are alike, the first and the copies that follow one another; 1 where none are."""
+    longest, run, before = 1, 1, (-1, -1)
+    for first, again in copies:
+        run = run + 1 if before == (first, again - 1) else 2
+        longest, before = max(longest, run), (first, again)
+    return longest
 
 
 def _moved(T_world_a: Float64Array, T_world_b: Float64Array) -> bool:

@@ -33,7 +33,9 @@ class CheckLimits:
             that jitter by 1 cm and 0.5 degrees too; a cloud moved by 0.3 m or more leaves 0.71 at most of one of them.
         min_colour_correlation: least rank correlation of brightness over points that two frames see, median over pairs
             of frames. On generated homes it is 0.92 and more, 0.79 with a Kinect's noise and jittering poses.
-        max_repeated_share: largest share of images that are copies of others between which the camera moved.
+        max_repeated_share: largest share of images that are copies of others between which the camera moved. None of a
+            renderer's are; a sensor that falls behind hands out its last image again, and the manifests of recorded
+            sequences allow for one in twenty. More than three alike in a row are refused in any case.
         min_measured_share: least share of the pixels of depth images that are measured.
         max_depth_step_m: largest step that all depth of a trajectory may be multiples of, m. A Kinect's is 1 mm; 8 bits
             over 5 m leave 20.

@@ -34,7 +34,7 @@ def floor_depth(record, wall_m=np.inf):
 
 def test_images_that_all_differ_are_kept(make_record):
     verdict = check(make_record(frames=10, step_m=0.05))
-    assert verdict.measured == {"repeated_colour_share": 0.0, "repeated_depth_share": 0.0}
+    assert verdict.measured == {"repeated_colour_share": 0.0, "repeated_depth_share": 0.0, "longest_run": 1}
 
 
 @pytest.mark.parametrize("kind", ["rgb", "depth"])
@@ -45,6 +45,24 @@ def test_copies_are_found_wherever_they_stand_and_files_as_well_as_pixels(make_r
     assert verdict.reason is Reason.FRAME_REPEATED
     assert (verdict.measured["frame"], verdict.measured["copy_of"]) == (8, 2)
     assert check(make_record(frames=10, step_m=0.05), **{kind: wrong}, max_share=0.1).keep  # one of ten
+
+
+@pytest.mark.parametrize(("again", "kept"), [(1, True), (2, True), (3, False)])
+def test_a_sensor_that_falls_behind_is_told_from_one_that_is_stuck(make_record, again, kept):
+    """Of 100 images one is shown again once to three times: within the share of 5 %, but not for long."""
+    shown = tuple(f"colour {t}".encode() for t in range(100))
+    stuck = (*shown[:40], *shown[39:40] * again, *shown[40 + again :])
+    verdict = check(make_record(frames=100, step_m=0.05, turn_deg=0.1), rgb=stuck, depth=(None,) * 100, max_share=0.05)
+    assert (verdict.keep, verdict.measured["longest_run"]) == (kept, 1 + again)
+    assert verdict.measured["repeated_colour_share"] == again / 100
+
+
+def test_a_run_of_images_counts_from_its_first_however_slow_the_camera_is(make_record):
+    """At 1 cm a frame no two neighbours are 2 cm apart: of ten alike, seven are farther than that from the first."""
+    record = make_record(frames=30, step_m=0.01, turn_deg=0.0)
+    frozen = (*(f"colour {t}".encode() for t in range(20)), *[b"colour 19"] * 10)
+    verdict = check(record, rgb=frozen, depth=(None,) * 30, max_share=0.5)
+    assert (verdict.reason, verdict.measured["frame"], verdict.measured["copy_of"]) == (Reason.FRAME_REPEATED, 22, 19)
 
 
 def test_a_camera_that_stands_still_may_show_the_same_again(make_record):
