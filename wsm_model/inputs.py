@@ -25,6 +25,7 @@ class ModelInputs:
         flow_time: tau of each latent, the same within a chunk, [B, F].
         spans: where the sequences stand.
         depth_context: what later chunks see of the depth, [B, F, C, h, w]; None: the depth itself.
+        rgb_context: what is seen of the clean RGB, [B, F, C, h, w]; None: the RGB itself.
     """
 
     rgb: Tensor
@@ -35,6 +36,7 @@ class ModelInputs:
     flow_time: Tensor
     spans: Sequence[SequenceSpan]
     depth_context: Tensor | None = None
+    rgb_context: Tensor | None = None
 
     @cached_property
     def table(self) -> FrameTable:

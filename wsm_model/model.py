@@ -79,8 +79,9 @@ class WorldSlamModel(MixtureOfTransformers):
             dim=1,
         )
         depth = inputs.depth if inputs.depth_context is None else inputs.depth_context
+        rgb = inputs.rgb if inputs.rgb_context is None else inputs.rgb_context
         values = {
-            Expert.GENERATION: torch.stack([inputs.rgb, inputs.noisy_rgb], dim=1),
+            Expert.GENERATION: torch.stack([rgb, inputs.noisy_rgb], dim=1),
             Expert.POSE: torch.stack(
                 [inputs.poses, identity_poses(*inputs.poses.shape[:-1], device=inputs.poses.device)], dim=1
             ),

@@ -48,7 +48,12 @@ _NOT_PART_OF_A_RUN = (
 A run that is to go on for longer follows the schedule of its new length from where it stands.
 """
 
-_LATER_SETTINGS = {"training.ema_decay": 0.0, "model.init": ""}
+_LATER_SETTINGS = {
+    "training.ema_decay": 0.0,
+    "training.rgb_noise": 0.0,
+    "training.rgb_noise_probability": 0.5,
+    "model.init": "",
+}
 """Settings that change nothing at these values, and are no part of a run then: one that began without them goes on."""
 
 

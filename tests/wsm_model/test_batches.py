@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from wsm_data.schema.sequence import SequenceSpan
-from wsm_model.batches import chunk_flow_times, noise_stream, training_inputs
+from wsm_model.batches import ContextNoise, chunk_flow_times, noise_stream, training_inputs
 
 SHIFT = 5.0
 
@@ -74,7 +74,7 @@ def test_noisy_latents_are_the_latents_and_their_noise_at_their_times(batch):
 
 def test_later_chunks_see_the_depth_blurred_by_one_share_a_sequence_and_the_rest_stays_as_it_is(batch):
     (plain,) = parts_of(batch)
-    (part,) = parts_of(batch, depth_noise=0.5)
+    (part,) = parts_of(batch, context=ContextNoise(depth=0.5))
     assert plain.inputs.depth_context is None
     assert torch.equal(part.inputs.depth, batch.depth)
     assert torch.equal(part.noise, plain.noise)
@@ -89,9 +89,28 @@ def test_later_chunks_see_the_depth_blurred_by_one_share_a_sequence_and_the_rest
     assert torch.equal(beyond, batch.depth[2, 3:])  # padding
 
 
+def test_some_sequences_are_seen_with_noise_in_their_rgb_and_what_is_learned_stays_as_it_is(batch):
+    """With a probability of 1 every sequence, with 1/2 one to three of the four by this seed."""
+    (plain,) = parts_of(batch)
+    assert plain.inputs.rgb_context is None
+    changed = []
+    for probability in (0.0, 0.5, 1.0):
+        (part,) = parts_of(batch, context=ContextNoise(rgb=0.5, rgb_probability=probability))
+        assert torch.equal(part.inputs.rgb, batch.rgb)
+        assert torch.equal(part.inputs.noisy_rgb, plain.inputs.noisy_rgb)
+        seen = part.inputs.rgb_context
+        changed.append(sum(not torch.equal(seen[span.place], batch.rgb[span.place]) for span in part.inputs.spans))
+        for span in part.inputs.spans:
+            given, found = batch.rgb[span.place].flatten(), seen[span.place].flatten()
+            assert -0.1 < 1 - float(found @ given / (given @ given)) < 0.6
+    assert changed[0] == 0
+    assert 1 <= changed[1] <= 3
+    assert changed[2] == 4
+
+
 def test_the_blur_of_a_sequence_does_not_depend_on_its_part(batch):
-    (whole,) = parts_of(batch, depth_noise=1.0)
-    parts = parts_of(batch, depth_noise=1.0, micro_rows=1)
+    (whole,) = parts_of(batch, context=ContextNoise(depth=1.0))
+    parts = parts_of(batch, context=ContextNoise(depth=1.0), micro_rows=1)
     for row, part in enumerate(parts):
         length = part.noise.shape[1]
         assert torch.equal(part.inputs.depth_context[0], whole.inputs.depth_context[row, :length])

@@ -117,11 +117,15 @@ def memory_bytes(
         is_recomputed: whether layers are recomputed in the backward pass.
     """
     share = 1 / hardware.gpus
+    is_rounded = precision is Precision.BFLOAT16
     copied = cost.layer_parameters if is_recomputed else cost.parameters
     # autocast's copies live as long as a layer's activations
-    whole = 2 * copied if precision is Precision.BFLOAT16 else 0
-    if hardware.gpus > 1:  # two layers are gathered at a time; the gradients of one are whole, and packed to be summed
-        whole += cost.layer_parameters * (2 * 4 + 2 * 4)
+    whole = 2 * copied if is_rounded else 0
+    if hardware.gpus > 1:
+        # two layers are gathered at a time, rounded: nothing is left to copy; the gradients of one are whole, and
+        # packed in float32 to be summed
+        gathered = 2 if is_rounded else 4
+        whole = cost.layer_parameters * (2 * gathered + gathered + 4)
     kept = _stream_bytes(config, precision) if is_recomputed else cost.layer.kept_bytes
     return {
         "weights, float32": 4 * cost.parameters * share,

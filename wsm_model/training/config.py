@@ -102,6 +102,9 @@ class TrainingConfig(LoopConfig):
         depth_noise: largest share s of noise eps in the depth latents d that later chunks see: of each sequence a
             share is drawn uniformly up to it, and they see (1 - s) d + s eps. In use they see estimates, which are not
             the truth (paper silent; 0: the truth, its teacher forcing).
+        rgb_noise: largest share of noise in the clean RGB latents, likewise, in some of the sequences. With 0.5 it is
+            the noisy history of LingBot-VA, whose dreams may stop half denoised (paper silent; 0: the truth).
+        rgb_noise_probability: that a sequence has noise in its RGB (LingBot-VA: 0.5).
         ema_decay: decay of an average of the weights over the steps, such as 0.999: it is what is measured, drawn and
             exported (paper silent; 0: none is kept).
         loss: weights of the parts.
@@ -115,6 +118,8 @@ class TrainingConfig(LoopConfig):
     compile: bool = False
     profile_steps: int = 0
     depth_noise: float = 0.0
+    rgb_noise: float = 0.0
+    rgb_noise_probability: float = 0.5
     ema_decay: float = 0.0
     loss: LossConfig = field(default_factory=LossConfig)
 
@@ -122,8 +127,9 @@ class TrainingConfig(LoopConfig):
         super().__post_init__()
         if not 0 <= self.ema_decay < 1:
             raise ValueError(f"ema_decay must lie in [0, 1), found {self.ema_decay}")
-        if not 0 <= self.depth_noise <= 1:
-            raise ValueError(f"depth_noise must lie in [0, 1], found {self.depth_noise}")
+        for name in ("depth_noise", "rgb_noise", "rgb_noise_probability"):
+            if not 0 <= getattr(self, name) <= 1:
+                raise ValueError(f"{name} must lie in [0, 1], found {getattr(self, name)}")
         for name in ("micro_rows", "seed", "profile_steps", "shard_ranks"):
             if getattr(self, name) < 0:
                 raise ValueError(f"{name} must not be negative, found {getattr(self, name)}")

@@ -7,7 +7,7 @@ import torch
 from torch import Tensor
 
 from wsm_data.schema.batch import ClipBatch
-from wsm_model.batches import TrainingInputs, training_inputs
+from wsm_model.batches import ContextNoise, TrainingInputs, training_inputs
 from wsm_model.losses.total import LossCounts, loss_counts, pretraining_loss
 from wsm_model.model import WorldSlamModel
 from wsm_model.precision import autocast
@@ -35,7 +35,9 @@ def pretraining_step(
         batch,
         seed=config.seed,
         flow_shift=config.loss.flow_shift,
-        depth_noise=config.depth_noise,
+        context=ContextNoise(
+            depth=config.depth_noise, rgb=config.rgb_noise, rgb_probability=config.rgb_noise_probability
+        ),
         micro_rows=config.micro_rows,
     )
     run.optimiser.zero_grad(set_to_none=True)

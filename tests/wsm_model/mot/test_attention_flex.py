@@ -5,6 +5,7 @@ import torch
 
 from wsm_data.schema.sequence import SequenceSpan, frame_table
 from wsm_model.config import Variant
+from wsm_model.model import Attention
 from wsm_model.mot.attention_flex import block_mask, compiled
 from wsm_model.mot.mask import dense_mask
 
@@ -29,6 +30,7 @@ def test_every_pair_is_allowed_as_in_the_dense_mask(make_model, table, variant):
     config = make_model(variant).config
     wanted, mask = dense_mask(config, table), block_mask(config, table, CPU)
     places = torch.arange(wanted.shape[1])
+    assert mask.seq_lengths == (2048, 2048)
     for row in range(len(wanted)):
         found = mask.mask_mod(torch.tensor(row), torch.tensor(0), places[:, None], places[None, :])
         assert torch.equal(found, wanted[row])
@@ -48,10 +50,25 @@ def test_blocks_that_are_skipped_are_empty_and_blocks_that_are_not_tested_are_fu
     assert not holds_any.all()  # some are skipped
 
 
-def test_more_lengths_than_torch_would_compile_by_itself_stay_compiled(config):
+def test_rows_are_filled_up_to_few_lengths_and_what_their_tokens_gather_is_the_same(
+    make_model, make_inputs, make_spans
+):
+    """Rows of 3 to 60 latents of 32 tokens: one length of 2048 tokens."""
+    spans = [make_spans([length], [2]) for length in (3, 60)]
+    lengths = [block_mask(make_model().config, frame_table(one, 1, one[0].length), CPU).seq_lengths for one in spans]
+    assert lengths == [(2048, 2048)] * 2
+    inputs = make_inputs(make_spans([3, 2], [2, 1]))
+    with torch.no_grad():  # on a processor flex_attention has no backward pass
+        found, wanted = (make_model(attention=kind)(inputs) for kind in (Attention.FLEX, Attention.DENSE))
+    torch.testing.assert_close(found.velocity, wanted.velocity, rtol=1e-4, atol=1e-4)
+    torch.testing.assert_close(found.poses[0], wanted.poses[0], rtol=1e-4, atol=1e-4)
+
+
+def test_more_lengths_than_torch_would_compile_by_itself_stay_compiled(config, monkeypatch):
     """Beyond its limit, torch's own fall-back would store all scores of all pairs."""
+    monkeypatch.setattr("wsm_model.mot.attention_flex._LENGTH_STEP", 128)
     attend = compiled(backend="eager")
-    for frames in range(1, 12):
+    for frames in range(1, 41, 4):
         mask = block_mask(
             config, frame_table([SequenceSpan(row=0, start=0, length=frames, chunk_size=2)], 1, frames), CPU
         )
