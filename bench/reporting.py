@@ -22,12 +22,12 @@ def machine(*packages: str) -> dict[str, object]:
     }
 
 
-def write_results(name: str, record: dict[str, object], lines: list[str]) -> None:
+def write_results(name: str, record: dict[str, object], lines: list[str], folder: Path = RESULTS) -> None:
     """Write results/<name>.json and results/<name>.md, and show the page."""
-    RESULTS.mkdir(exist_ok=True)
-    (RESULTS / f"{name}.json").write_text(json.dumps(record, indent=1) + "\n")
+    folder.mkdir(exist_ok=True)
+    (folder / f"{name}.json").write_text(json.dumps(record, indent=1) + "\n")
     page = "\n".join(lines) + "\n"
-    (RESULTS / f"{name}.md").write_text(page)
+    (folder / f"{name}.md").write_text(page)
     print(page)
 
 
