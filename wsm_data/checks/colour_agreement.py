@@ -18,7 +18,7 @@ from wsm_data.schema.arrays import Float32Array, Float64Array, Int64Array
 from wsm_data.schema.episode import EpisodeRecord
 from wsm_data.schema.verdict import Verdict
 
-MAX_POINTS = 800
+MAX_POINTS = 400
 MIN_POINTS = 100
 MAX_STEPS = 8
 MAX_DEPTH_ERROR = 0.05

@@ -33,7 +33,7 @@ _DEPTH_SCALES: Mapping[str, float] = {f"depth were divided by {scale:g}": scale 
 """Units that are mistaken for one another: millimetres, metres, 1/10 mm, and the 1/5000 m of TUM's benchmark. Depth
 that is far too small tells nothing: the poses lead out of all that it shows."""
 
-MAX_POINTS = 1600
+MAX_POINTS = 1200
 """So many pixels of a frame are compared at most."""
 
 MIN_POINTS = 50
@@ -58,7 +58,7 @@ noise and poses that jitter, 7 % of the points, at slanted surfaces, prefer them
 MIN_VOTES = 2 / 3
 """and so large a share of these pairs is for it: the error of one pose is in two pairs at most."""
 
-MAX_MEANING_PAIRS = 12
+MAX_MEANING_PAIRS = 8
 """Other meanings are tried in so many of the pairs at most, since one that is right is so in all of them;"""
 
 SHIFTED_FRAMES = 3

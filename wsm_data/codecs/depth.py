@@ -5,6 +5,8 @@ u = log(d / d_min) / log(d_max / d_min) with d clipped to [d_min, d_max]; the vi
 and the share of measured pixels in each latent cell is stored beside the latents.
 """
 
+from functools import lru_cache
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -44,8 +46,14 @@ def depth_m_from_raw(raw_u16: Uint16Array, encoding: DepthEncoding) -> Float32Ar
 
     The product is formed in float64 and rounded once, so it does not depend on how `metres_per_unit` rounds to float32.
     """
-    depth_m = (raw_u16.astype(np.float64) * encoding.metres_per_unit).astype(np.float32)
-    depth_m[~is_measured(raw_u16, encoding)] = 0
+    return _metres_table(encoding)[raw_u16]
+
+
+@lru_cache(maxsize=4)
+def _metres_table(encoding: DepthEncoding) -> Float32Array:
+    codes = np.arange(_RAW_CODES, dtype=np.uint16)
+    depth_m = (codes * np.float64(encoding.metres_per_unit)).astype(np.float32)
+    depth_m[~is_measured(codes, encoding)] = 0
     return depth_m
 
 

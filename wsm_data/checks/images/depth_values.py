@@ -10,7 +10,7 @@ from wsm_data.schema.arrays import Float32Array, Float64Array
 from wsm_data.schema.source.check_limits import CheckLimits
 from wsm_data.schema.verdict import Verdict
 
-ROWS_APART = 8
+MAX_IMAGES, ROWS_APART = 16, 8
 MIN_VALUES = 10_000
 MAX_8_BIT_VALUES = 256
 
@@ -35,7 +35,8 @@ def check_depth_values(
     """
     if not depth_m:
         return {}
-    rows = np.concatenate([image[::ROWS_APART] for image in depth_m]).astype(np.float64)
+    spread = depth_m[:: -(-len(depth_m) // MAX_IMAGES)]
+    rows = np.concatenate([image[::ROWS_APART] for image in spread]).astype(np.float64)
     share = float(np.mean(rows > 0))
     noise = _relative_noise(rows)
     step_m, values = _step_m(rows, metres_per_unit)

@@ -159,11 +159,10 @@ def pair_costs(record: EpisodeRecord, video: Float32Array, depth_range: DepthRan
     def errors_of(
         poses: Float64Array, numbers: Int64Array, hypotheses: Sequence[tuple[int, int]]
     ) -> list[Float64Array]:
+        motions = pair_motions(poses, numbers, numbers + lag, hypotheses)
         return [
-            warp_errors(
-                video, a, a + lag, pair_motions(poses, a, a + lag, hypotheses), intrinsics, depth_range, MAX_POINTS
-            )
-            for a in numbers.tolist()
+            warp_errors(video, a, a + lag, of_pair, intrinsics, depth_range, MAX_POINTS)
+            for a, of_pair in zip(numbers.tolist(), motions, strict=True)
         ]
 
     own, smoothed = (_median(errors_of(poses, first[::4], [(0, 0)])) for poses in (record.T_world_camera, smooth))

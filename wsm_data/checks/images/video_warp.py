@@ -5,7 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from numba import njit
 
-from wsm_data.schema.arrays import Float32Array, Float64Array
+from wsm_data.geometry.transform import invert
+from wsm_data.schema.arrays import Float32Array, Float64Array, Int64Array
 from wsm_data.schema.camera import Intrinsics
 from wsm_data.schema.depth import DepthRange
 
@@ -44,14 +45,19 @@ def warp_errors(
     return np.asarray(_warp(video[a], video[b], stride, np.ascontiguousarray(motions), K, middle, span))
 
 
-def pair_motions(T_world_camera: Float64Array, a: int, b: int, offsets: Sequence[tuple[int, int]]) -> Float64Array:
-    """`T_b_a` where frame a has the pose of so many frames later, and b that of so many; float64 [M, 4, 4]."""
+def pair_motions(
+    T_world_camera: Float64Array, a: Int64Array, b: Int64Array, offsets: Sequence[tuple[int, int]]
+) -> Float64Array:
+    """`T_b_a` of pairs where frame a has the pose of so many frames later, and b that of so many; float64 [P, M, 4, 4].
+
+    Args:
+        T_world_camera: poses of all frames; float64 [T, 4, 4].
+        a: the first frames of the pairs; int64 [P].
+        b: the second.
+        offsets: M times, of the pose of the first frame and of the second.
+    """
     before, after = np.array(offsets).T
-    T_a, T_b = T_world_camera[a + before], T_world_camera[b + after]
-    rotations = np.swapaxes(T_b[:, :3, :3], 1, 2)
-    motions: Float64Array = np.tile(np.eye(4), (len(offsets), 1, 1))
-    motions[:, :3, :3] = rotations @ T_a[:, :3, :3]
-    motions[:, :3, 3] = np.einsum("mij,mj->mi", rotations, T_a[:, :3, 3] - T_b[:, :3, 3])
+    motions: Float64Array = invert(T_world_camera)[b[:, None] + after] @ T_world_camera[a[:, None] + before]
     return motions
 
 

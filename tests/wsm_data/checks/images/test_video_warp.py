@@ -54,6 +54,7 @@ def test_edges_do_not_count():
 
 def test_motions_are_those_between_the_poses_of_other_frames(make_record):
     T = make_record(frames=12).T_world_camera
-    motions = pair_motions(T, 3, 8, [(0, 0), (2, 2), (0, -1)])
-    for motion, (a, b) in zip(motions, [(3, 8), (5, 10), (3, 7)], strict=True):
+    motions = pair_motions(T, np.array([2, 3]), np.array([4, 8]), [(0, 0), (2, 2), (0, -1)])
+    assert motions.shape == (2, 3, 4, 4)
+    for motion, (a, b) in zip(motions[1], [(3, 8), (5, 10), (3, 7)], strict=True):
         np.testing.assert_allclose(motion, invert(T[b]) @ T[a], atol=1e-12)
