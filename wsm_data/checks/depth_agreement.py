@@ -205,15 +205,20 @@ def _against_own(
             tells = _differ(mine, other, max_error)
             if _enough(tells, mine):
                 told[name].append(np.abs([mine[tells], other[tells]]))
-    return {name: _decided(one, seen) for name, one in told.items()}
+    return {name: _decided(one, seen, max_error) for name, one in told.items()}
 
 
-def _decided(told: Sequence[Float64Array], seen: int) -> tuple[float, float, float]:
-    """Median errors [own, other] over pairs of [2, N] errors of the points that tell, and their share of those seen."""
+def _decided(told: Sequence[Float64Array], seen: int, max_error: float) -> tuple[float, float, float]:
+    """Median errors [own, other] over pairs of [2, N] errors of the points that tell, and their share of those seen.
+
+    NaN too where the own poses err by no more than the limit in most points: they need no other meaning.
+    """
     if not told:
         return math.nan, math.nan, 0.0
-    votes = np.mean([np.median(mine) > np.median(other) for mine, other in told])
     both = np.concatenate(told, axis=1)
+    if 2 * np.count_nonzero(both[0] > max_error) < both.shape[1]:
+        return math.nan, math.nan, 0.0
+    votes = np.mean([np.median(mine) > np.median(other) for mine, other in told])
     least = MIN_DECIDING_SHARE if len(told) >= MIN_DECIDING_PAIRS else LARGE_DECIDING_SHARE
     if both.shape[1] < least * seen or votes < MIN_VOTES:
         return math.nan, math.nan, 0.0
