@@ -16,6 +16,7 @@ from pipelines.commands.clips import export, film
 from pipelines.commands.command import Command, CommandGroup
 from pipelines.commands.evaluating import group as evaluate
 from pipelines.commands.models import dream
+from pipelines.commands.models import group as models
 from pipelines.commands.runs import clean, retry
 from pipelines.commands.soundness import audit_latents, check, preflight
 from pipelines.running.interrupts import (
@@ -46,6 +47,7 @@ COMMANDS: tuple[Command | CommandGroup, ...] = (
     train.COMMAND,
     evaluate.GROUP,
     dream.COMMAND,
+    models.GROUP,
     serve.COMMAND,
     source.GROUP,
     preflight.COMMAND,

@@ -50,6 +50,27 @@ _IN_BLOCK: Mapping[str, str] = MappingProxyType(
 )
 _UNUSED = re.compile(r"(condition_embedder\.)?text_embedd(er|ing)\.")
 _BLOCK = re.compile(r"blocks\.(\d+)\.(.+)")
+_OUR_BLOCK = re.compile(r"layers\.(\d+)\.(.+)")
+_IS_DIFFUSERS = re.compile(
+    r"patch_embedding|condition_embedder\..*|proj_out|scale_shift_table|attn[12]\..*|norm2|ffn\.net\..*"
+)
+_THEIRS: Mapping[str, str] = MappingProxyType(
+    {ours: theirs for theirs, ours in _OUTER.items() if _IS_DIFFUSERS.fullmatch(theirs)}
+    | {f"goal.linear_{number}": f"condition_embedder.text_embedder.linear_{number}" for number in (1, 2)}
+)
+"""The other way round; the goal is embedded as a text is, by the same two layers."""
+_THEIRS_IN_BLOCK: Mapping[str, str] = MappingProxyType(
+    {ours: theirs for theirs, ours in _IN_BLOCK.items() if _IS_DIFFUSERS.fullmatch(theirs)}
+)
+
+
+def diffusers_name(name: str) -> str | None:
+    """Name in the layout of diffusers of a tensor of ours, `{expert}` taken out; None where it has none there."""
+    block = _OUR_BLOCK.fullmatch(name)
+    words, table = (block[2], _THEIRS_IN_BLOCK) if block else (name, _THEIRS)
+    lead = f"blocks.{block[1]}." if block else ""
+    stem, suffix = _split(words)
+    return f"{lead}{table[stem]}{suffix}" if stem in table else None
 
 
 def is_unused(name: str) -> bool:
