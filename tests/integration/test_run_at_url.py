@@ -39,11 +39,11 @@ def test_another_machine_goes_on_from_what_is_there(run, tmp_path):
     url = f"memory://run-{tmp_path.name}"
     run("--out", tmp_path / "plain")
     first = run("--out", url, "--work", tmp_path / "first")
-    assert f"files were sent to {url}/pack" in first
+    assert f"pack: files sent to {url}/pack: " in first
     assert open_release(f"{url}/pack/release").digest == open_release(tmp_path / "plain/pack/release").digest
     second = run("--out", url, "--work", tmp_path / "second")
-    assert f"files came from {url}/encode" in second
-    assert f"pack: 0 files were sent to {url}/pack" in second
+    assert f"encode: files brought from {url}/encode: " in second
+    assert f"pack: files sent to {url}/pack: 1" in second  # stage.json, which says where the folders are
     assert contents(tmp_path / "second/pack/release") == contents(tmp_path / "plain/pack/release")
 
 

@@ -51,9 +51,9 @@ def run_at_url(recipe: str, request: StageRequest, url: str, work: Path | None) 
 def _bring(stages: Sequence[str], url: str, work: Path) -> None:
     for name in stages:
         if not (work / name / STAGE_FILE).exists() and (files := bring_folder(f"{url}/{name}", work / name)):
-            typer.echo(f"{name}: {files} files came from {url}/{name}")
+            typer.echo(f"{name}: files brought from {url}/{name}: {files}")
 
 
 def _send(name: str, url: str, work: Path) -> None:
     sent = send_folder(work / name, f"{url}/{name}", _LAST)
-    typer.echo(f"{name}: {sent} files were sent to {url}/{name}")
+    typer.echo(f"{name}: files sent to {url}/{name}: {sent}")
