@@ -10,6 +10,22 @@ from enum import StrEnum
 
 _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
 
+_SECRETS = (
+    re.compile(r"(?<=://)[^/@\s]+(?=@)(?=[^/\s]*/|[^/\s]*$)"),  # user:password@host, as of FTP, SFTP and HTTP
+    re.compile(
+        r"(?i)(?<=[?&;])(?:x-amz-[a-z-]+|x-goog-[a-z-]+|awsaccesskeyid|signature|sig|sv|se|[a-z_-]*(?:token|key|secret|passw)"
+        r"[a-z_-]*)=[^&;\s]*"
+    ),  # a signed URL
+    re.compile(r"\bhf_[A-Za-z0-9]{16,}"),
+)
+
+
+def without_secrets(text: str) -> str:
+    """A text in which whatever of a URL may be a credential is replaced by `***`."""
+    for pattern in _SECRETS:
+        text = pattern.sub("***", text)
+    return text
+
 
 def printable(text: str) -> str:
     """Text that a terminal, a file and a table take: control characters and halves of surrogates as escapes.
@@ -120,12 +136,12 @@ class Reason(StrEnum):
 
 
 class WsmError(Exception):
-    """A foreseen failure. The message says what must hold, what was found, where, and what to do."""
+    """A foreseen failure. The message says what must hold, what was found, where, and what to do, and no credential."""
 
     exit_code = 1
 
     def __init__(self, message: str):
-        super().__init__(printable(message))
+        super().__init__(without_secrets(printable(message)))
 
 
 class ConfigError(WsmError):

@@ -9,7 +9,7 @@ import xxhash
 
 from wsm_data.errors import ConfigError
 from wsm_data.files.atomic import is_full_disk, write_bytes
-from wsm_data.files.locations import is_url
+from wsm_data.files.locations import is_url, require_no_secret
 
 _LOG = logging.getLogger(__name__)
 _READ_BYTES = 4 << 20
@@ -23,8 +23,9 @@ def content_digest(location: str, missing: str) -> str:
         missing: what to say where there is no such file.
 
     Raises:
-        ConfigError: there is none.
+        ConfigError: there is none, or a URL holds credentials.
     """
+    require_no_secret(location)
     digest = xxhash.xxh3_128()
     try:
         with fsspec.open(location, "rb") as file:
@@ -75,6 +76,10 @@ def warn_if_not_writable(release: str, name: str, otherwise: str) -> None:
         release: folder or URL of the release.
         name: name of the copy in the release.
         otherwise: how others are told of it.
+
+    Raises:
+        ConfigError: the URL holds credentials.
     """
+    require_no_secret(release)
     if why := why_not_writable(release, name):
         _LOG.warning("%s will not be copied into %s (%s): %s", name, release, why, otherwise)

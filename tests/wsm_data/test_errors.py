@@ -60,3 +60,8 @@ def test_a_reason_is_written_as_its_code():
 def test_a_message_shows_names_that_a_terminal_must_not_see_as_escapes():
     assert str(ConfigError("a\x1b[31m\udcff\u202eb\nc")) == "a\\x1b[31m\\udcff\\u202eb\nc"
     assert DataError(Reason.FRAME_EMPTY, "\x07").message == "\\x07"
+
+
+def test_a_message_leaves_out_what_may_be_a_credential_in_a_url():
+    message = "no answer of https://me:planted@host/a?X-Amz-Signature=planted&part=1; ask s3://bucket/key@2"
+    assert str(StoreError(message)) == "no answer of https://***@host/a?***&part=1; ask s3://bucket/key@2"

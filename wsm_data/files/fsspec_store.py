@@ -12,6 +12,7 @@ from typing import Any
 import fsspec
 
 from wsm_data.errors import ConfigError, StoreError
+from wsm_data.files.locations import require_no_secret
 from wsm_data.files.retries import NOT_THERE, Answer, RequestConfig, ask, may_pass
 
 _TIMED_BYTES = 8 << 20
@@ -36,8 +37,10 @@ class FsspecStore:
             request: how the store is asked.
 
         Raises:
-            ConfigError: fsspec does not know such URLs, or needs a package for them that is not installed.
+            ConfigError: fsspec does not know such URLs, needs a package for them that is not installed, or it holds
+                credentials.
         """
+        require_no_secret(root)
         self.root = root
         self.request = request
         self._connect()

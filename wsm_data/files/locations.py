@@ -3,10 +3,23 @@
 import re
 from pathlib import Path
 
-from wsm_data.errors import ConfigError
+from wsm_data.errors import ConfigError, without_secrets
 
 _CUT_URL = re.compile(r"^([A-Za-z][A-Za-z0-9+.-]+):/(?!/)")
 """What `Path` makes of a URL. No folder of a person begins so."""
+
+
+def require_no_secret(location: str) -> None:
+    """Check that a URL holds no credential: it is written into records, reports and messages.
+
+    Raises:
+        ConfigError: it does; the message leaves them out.
+    """
+    if (shown := without_secrets(location)) != location:
+        raise ConfigError(
+            f"a URL must hold no credentials, for it is written down in records and reports; found {shown}. Give them "
+            "by the environment, or by the files of the store's client"
+        )
 
 
 def is_url(location: str | Path) -> bool:

@@ -13,7 +13,7 @@ from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.files.retries import NOT_THERE
 from wsm_data.files.stores import LocalStore
 from wsm_data.files.uploads.local_file import LocalFile, look_at
-from wsm_data.files.uploads.target import Target, open_target
+from wsm_data.files.uploads.target import Target, open_target, send
 from wsm_data.shards.names import MANIFEST_NAME, is_shard_name
 
 
@@ -120,11 +120,11 @@ def _make_room(target: Target, files: ReleaseFiles, config: PublishConfig) -> No
 def _send_all(target: Target, folder: Path, files: ReleaseFiles, config: PublishConfig) -> Iterator[_Sent]:
     """Send everything but the manifest, several files at a time, as each is settled."""
 
-    def send(name: str) -> _Sent:
+    def send_one(name: str) -> _Sent:
         return _send(target, name, _checked(folder / name, files.vouched.get(name), config.part_mib << 20))
 
     with ThreadPoolExecutor(config.threads, thread_name_prefix="wsm-publish") as pool:
-        waiting = [pool.submit(send, name) for name in (*files.vouched, *files.attached)]
+        waiting = [pool.submit(send_one, name) for name in (*files.vouched, *files.attached)]
         try:
             yield from (done.result() for done in as_completed(waiting))
         finally:
@@ -146,10 +146,7 @@ def _checked(path: Path, sha256: str | None, part_bytes: int) -> LocalFile:
 
 
 def _send(target: Target, name: str, file: LocalFile) -> _Sent:
-    is_there = target.holds(name, file)
-    if not is_there:
-        target.put(name, file)
-    return _Sent(name=name, file=file, was_sent=not is_there)
+    return _Sent(name=name, file=file, was_sent=send(target, name, file))
 
 
 def _remove_others(target: Target, files: ReleaseFiles) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from wsm_data.errors import ConfigError, StoreError
 from wsm_data.files.fsspec_store import FsspecStore
+from wsm_data.files.locations import require_no_secret
 from wsm_data.files.retries import Answer, RequestConfig, ask
 from wsm_data.files.uploads.local_file import LocalFile
 
@@ -28,8 +29,9 @@ class HubTarget:
         """Name the repository; it is made where there is none, and private then.
 
         Raises:
-            ConfigError: it is no such URL, or huggingface_hub is not installed.
+            ConfigError: it is no such URL, it holds a token, or huggingface_hub is not installed.
         """
+        require_no_secret(url)
         try:
             from huggingface_hub import HfApi
         except ModuleNotFoundError as error:

@@ -15,8 +15,8 @@ from wsm_data.files.json_values import from_json, to_json
 from wsm_data.files.retries import NOT_THERE
 from wsm_data.files.sealed import sealed, unsealed
 from wsm_data.files.stores import Store, open_store
-from wsm_data.files.uploads.local_file import LocalFile, look_at
-from wsm_data.files.uploads.target import Target, open_target
+from wsm_data.files.uploads.local_file import look_at
+from wsm_data.files.uploads.target import open_target, send
 
 MIRROR_NAME = "mirror.json"
 _THREADS = 8
@@ -62,9 +62,9 @@ def send_folder(folder: Path, url: str, last: tuple[str, ...] = ()) -> int:
         return 0
     for name in (MIRROR_NAME, *sorted(old.files.keys() - new.files.keys() if old else ())):
         target.remove(name)
-    sent = sum(_side_by_side(lambda name: _send(target, name, looked[name]), early))
+    sent = sum(_side_by_side(lambda name: send(target, name, looked[name]), early))
     target.settle()
-    sent += sum(_send(target, name, looked[name]) for name in names[len(early) :])
+    sent += sum(send(target, name, looked[name]) for name in names[len(early) :])
     target.settle()
     with TemporaryDirectory(prefix="wsm-mirror-") as scratch:
         path = Path(scratch, MIRROR_NAME)
@@ -109,13 +109,6 @@ def _mirror(store: Store) -> Mirror | None:
             "the same command again"
         ) from error
     return mirror
-
-
-def _send(target: Target, name: str, file: LocalFile) -> bool:
-    is_there = target.holds(name, file)
-    if not is_there:
-        target.put(name, file)
-    return not is_there
 
 
 def _bring(store: Store, name: str, path: Path, sha256: str) -> None:

@@ -2,7 +2,9 @@
 
 from typing import Protocol
 
+from wsm_data.errors import StoreError
 from wsm_data.files.fsspec_store import FsspecStore
+from wsm_data.files.retries import NOT_THERE
 from wsm_data.files.uploads.fsspec_target import FsspecTarget
 from wsm_data.files.uploads.hub_target import HUB_SCHEME, HubTarget
 from wsm_data.files.uploads.local_file import LocalFile
@@ -46,3 +48,18 @@ def open_target(url: str) -> Target:
         return HubTarget(url)
     store = FsspecStore(url)
     return S3Target(store) if url.startswith(("s3://", "s3a://")) else FsspecTarget(store)
+
+
+def send(target: Target, name: str, file: LocalFile) -> bool:
+    """Upload a file where the store does not hold it already; returns whether it was sent.
+
+    Raises:
+        StoreError: there is no such bucket, or as `Target.put`.
+    """
+    if target.holds(name, file):
+        return False
+    try:
+        target.put(name, file)
+    except NOT_THERE as error:
+        raise StoreError(f"{target.store.root} takes no files, as if there were no such bucket: {error}") from error
+    return True
