@@ -39,6 +39,7 @@ COMMANDS: tuple[Command | CommandGroup, ...] = (
     settings.COMMAND,
     stores.PUBLISH_COMMAND,
     stores.FETCH_COMMAND,
+    stores.MERGE_COMMAND,
     inspect.COMMAND,
     film.COMMAND,
     export.GROUP,

@@ -1,4 +1,4 @@
-"""`wsm publish` and `wsm fetch`: a release to a store, and from it."""
+"""`wsm publish`, `wsm fetch` and `wsm merge`: releases as wholes."""
 
 from pathlib import Path
 from typing import Annotated
@@ -44,6 +44,19 @@ def fetch(
     work(url, folder, threads, quiet)
 
 
+def merge(
+    releases: Annotated[list[str], typer.Argument(metavar="A B ...", help="Folders or URLs of releases.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder of the new release.")],
+    name: Annotated[str, typer.Option("--name", help="Name of the new release.")] = "release",
+    shard_mib: Annotated[int, typer.Option("--shard-mib", min=1, help="Shards are filled up to this size, MiB.")] = 512,
+) -> None:
+    """Merge releases."""
+    from pipelines.operations.stores import merge as work
+
+    work(releases, out, name, shard_mib)
+
+
+MERGE_COMMAND = Command(name="merge", summary="Make one release of several, verified, with their digests.", call=merge)
 PUBLISH_COMMAND = Command(name="publish", summary="Put a release behind a URL, compared and resumable.", call=publish)
 FETCH_COMMAND = Command(
     name="fetch", summary="Bring a published release into a folder, compared and resumable.", call=fetch

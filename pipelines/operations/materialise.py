@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass, field
 
 from pipelines.artifacts.layout import release_folder
 from pipelines.running.stage import Finished, Outcome, Settled, Stage, StageContext, Unit
-from wsm_data.access.materialise import copy_shard, finish_selection, lay_out_selection
+from wsm_data.access.derived.materialise import copy_shard, finish_selection, lay_out_selection
 from wsm_data.access.release import Release, open_release
 from wsm_data.files.digest import digest_json, sha256_bytes
 from wsm_data.files.stores import open_store

@@ -1,11 +1,13 @@
-"""`wsm publish` and `wsm fetch`."""
+"""`wsm publish`, `wsm fetch` and `wsm merge`."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import typer
 from tqdm import tqdm
 
-from pipelines.stages.verify import require_sound_attached
+from pipelines.stages.verify import require_sound, require_sound_attached
+from wsm_data.access.derived.merge import merge_releases
 from wsm_data.access.release import open_release, read_manifest
 from wsm_data.access.transfer.config import PublishConfig
 from wsm_data.access.transfer.fetch import fetch_release
@@ -54,3 +56,22 @@ def fetch(url: str, folder: Path, threads: int, quiet: bool) -> None:
         f"{folder} holds the release of {url}: {moved.moved_files} of {moved.files} files came "
         f"({moved.moved_bytes:,} bytes), the others were there; every file has the sha256 of the manifest"
     )
+
+
+def merge(locations: Sequence[str], out: Path, name: str, shard_mib: int) -> None:
+    """Make one release of several, verify it, and say what it holds.
+
+    Raises:
+        ConfigError: fewer than two are given, they do not fit together, or the folder holds something.
+        IntegrityError: one of them is damaged.
+    """
+    if len(locations) < 2:
+        raise ConfigError("`wsm merge` must be given two releases at least, found one")
+    if out.exists() and any(out.iterdir()) and not any(out.glob("*.tar")):
+        raise ConfigError(f"{out} must be empty, or hold what an earlier `wsm merge` left; use another --out")
+    releases = [open_release(location) for location in locations]
+    if any(str(out.resolve()) == str(Path(location).resolve()) for location in locations):
+        raise ConfigError(f"{out} is one of the releases that are merged; use another --out")
+    merge_releases(releases, out, name, shard_mib << 20)
+    clips = require_sound(str(out), quiet=True)
+    typer.echo(f"{out} holds {name}, {clips} clips of {len(releases)} releases, and is whole")

@@ -4,7 +4,7 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from wsm_data.access.materialise import copy_shard, finish_selection, lay_out_selection
+from wsm_data.access.derived.materialise import copy_shard, finish_selection, lay_out_selection
 from wsm_data.access.release import open_release
 from wsm_data.curation.diversity import DiversityConfig
 from wsm_data.curation.rule import RuleConfig

@@ -81,7 +81,7 @@ def finish_selection(
     require_shards(folder, layouts, shards)
     parent = release.manifest
     content = ReleaseContent(
-        table=_index(release.index, layouts),
+        table=moved_index(release.index, layouts),
         shards=shards,
         rgb_statistics=parent.rgb_statistics,
         depth_statistics=parent.depth_statistics,
@@ -108,7 +108,7 @@ def _facts(release: Release, selection: Selection, fingerprints: Mapping[str, st
     )
 
 
-def _index(index: IndexTable, layouts: Sequence[ShardLayout]) -> pa.Table:
+def moved_index(index: IndexTable, layouts: Sequence[ShardLayout]) -> pa.Table:
     """Rows of the parent's index in the order of the new shards, with their new places."""
     clips = [clip for layout in layouts for clip in layout.clips]
     table = index.columns(SCHEMA.names).take(pa.array(index.rows_of([clip.key for clip in clips])))
