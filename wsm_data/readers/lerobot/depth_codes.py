@@ -1,4 +1,4 @@
-"""LeRobot's quantisation of depth videos, undone.
+"""LeRobot's quantisation of depth videos, done and undone.
 
 A code q of 12 bits stands for exp(a + q (b - a) / 4095) - shift metres, with a = log(depth_min + shift) and
 b = log(depth_max + shift); without logarithm for depth_min + q (depth_max - depth_min) / 4095 (LeRobot 0.6,
@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from wsm_data.schema.arrays import Uint16Array
+from wsm_data.schema.arrays import Float32Array, Uint16Array
 
 CODES = 1 << 12
 _UINT16_MAX = np.iinfo(np.uint16).max
@@ -43,6 +43,15 @@ class DepthQuantisation:
             or (self.use_log and self.depth_min + self.shift <= 0)
         ):
             raise ValueError(f"a quantisation of depth needs 0 <= depth_min < depth_max and a logarithm, found {self}")
+
+
+def codes_from_depth(depth_m: Float32Array, quantisation: DepthQuantisation) -> Uint16Array:
+    """The nearest code of each depth, uint16 in the shape of `depth_m`; 0 where there is no measurement, 0 m."""
+    low, high, depth = quantisation.depth_min, quantisation.depth_max, np.asarray(depth_m, np.float64)
+    if quantisation.use_log:
+        low, high = math.log(low + quantisation.shift), math.log(high + quantisation.shift)
+        depth = np.log(depth + quantisation.shift)
+    return np.rint(np.clip((depth - low) / (high - low), 0, 1) * (CODES - 1)).astype(np.uint16)
 
 
 def quantisation_of(feature: Mapping[str, Any]) -> DepthQuantisation:
