@@ -59,7 +59,7 @@ def _pandas_column(name: str, pandas_type: str, numpy_type: str) -> dict[str, ob
 
 def _video(video: VideoFormat, size: tuple[int, int], fps: int, more: Mapping[str, object]) -> dict[str, object]:
     width, height = size
-    words = {"height": height, "width": width, "channels": video.channels, "fps": fps}
+    words: dict[str, object] = {"height": height, "width": width, "channels": video.channels, "fps": fps}
     words |= {"codec": video.codec, "pix_fmt": video.pixels}
     info = {**{f"video.{name}": value for name, value in words.items()}, "has_audio": False, **more}
     names = ["height", "width", "channels"]

@@ -127,7 +127,7 @@ class LerobotWriter:
         arrays = {name: pa.FixedSizeListArray.from_arrays(row.ravel(), row.shape[1]) for name, row in rows.items()}
         arrays["timestamp"] = pa.array((frames / FPS).astype(np.float32))
         numbers = {"frame_index": frames, "index": self._ends[-2] + frames}
-        numbers |= {"episode_index": np.full(count, len(self._episodes) - 1), "task_index": np.zeros(count)}
+        numbers |= {"episode_index": np.full(count, len(self._episodes) - 1), "task_index": np.zeros_like(frames)}
         arrays |= {name: pa.array(values.astype(np.int64)) for name, values in numbers.items()}
         return pa.table(arrays, schema=row_schema())
 
