@@ -25,10 +25,17 @@ def inspect(
     ] = None,
     limit: Annotated[int, typer.Option("--limit", min=0, help="Clips to list; 0: all.")] = 20,
     weights: Annotated[str, typer.Option("--weights", help="Folder of the codec's weights, where it has any.")] = "",
+    as_json: Annotated[bool, typer.Option("--json", help="As JSON, and without a picture.")] = False,
 ) -> None:
     """Show a release, or a clip of it."""
-    from pipelines.operations.inspect import inspect_release
+    from pipelines.operations.inspect import inspect_release, print_json
+    from wsm_data.errors import ConfigError
 
+    if as_json and (out or rerun):
+        raise ConfigError("--json writes no file: leave out --out and --rerun, or --json")
+    if as_json:
+        print_json(release, key, limit)
+        return
     inspect_release(release, key, out, rerun, limit, weights)
 
 

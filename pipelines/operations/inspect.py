@@ -1,12 +1,15 @@
 """`wsm inspect`: what is in a release, as text, and one clip as a picture or a recording."""
 
+import json
 from pathlib import Path
 
 import typer
 
 from wsm_data.access.release import Release, open_release
 from wsm_data.errors import ConfigError
+from wsm_data.files.json_values import to_json
 from wsm_data.schema.identity import EpisodeId
+from wsm_data.shards.manifest import release_digest
 from wsm_data.shards.release_codec import codec_of
 from wsm_data.view.clip.contact_sheet import draw_contact_sheet
 from wsm_data.view.clip.rerun_export import write_rerun
@@ -40,6 +43,23 @@ def inspect_release(
         path = out or Path(f"{clip.meta.key.replace('/', '_')}.png")
         draw_contact_sheet(clip, codec, path)
         typer.echo(f"contact sheet: {path}")
+
+
+def print_json(location: str, key: str | None, limit: int) -> None:
+    """Print as JSON the manifest of a release and the keys of its first `limit` clips (0: all), or what one clip says.
+
+    Raises:
+        ConfigError: there is no such release or clip.
+    """
+    release = open_release(location)
+    record: dict[str, object] = {"release_digest": release_digest(release.manifest)}
+    if key is None:
+        keys = sorted(release.index.texts("key"))
+        record |= {"manifest": to_json(release.manifest), "clips": keys[:limit] if limit else keys}
+    else:
+        clip = release.read_clip(find_key(release, key))
+        record |= {"meta": to_json(clip.meta), "shapes": {name: list(one.shape) for name, one in clip.arrays().items()}}
+    typer.echo(json.dumps(record, indent=2))
 
 
 def find_key(release: Release, text: str) -> str:

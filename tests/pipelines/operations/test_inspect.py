@@ -1,11 +1,14 @@
 """`wsm inspect`: what it prints and draws of a small release."""
 
+import json
+from pathlib import Path
+
 import cv2
 import pytest
 from box_room import MANIFEST_TOML, along_x, scene_files, write_folder
 
 from pipelines.cli import app
-from pipelines.operations.inspect import inspect_release
+from pipelines.operations.inspect import inspect_release, print_json
 from pipelines.recipe import Recipe, stage_config
 from pipelines.registry import load_stage
 from pipelines.running.options import RunOptions
@@ -159,3 +162,20 @@ def test_a_release_that_is_not_there_or_unfinished_is_named(release, tmp_path):
     (tmp_path / "begun").mkdir()
     with pytest.raises(IntegrityError, match="unfinished"):
         inspect(tmp_path / "begun")
+
+
+def test_json_says_of_a_release_and_of_a_clip_what_the_files_say(tmp_path, monkeypatch, capsys):
+    monkeypatch.syspath_prepend(str(Path(__file__).parents[2] / "wsm_data" / "fakes"))
+    from walled_release import UNITS, build_release
+
+    release = build_release(tmp_path, UNITS)
+    print_json(release.store.root, None, 2)
+    said = json.loads(capsys.readouterr().out)
+    stored = json.loads((tmp_path / "release" / "dataset.json").read_text())
+    assert said["manifest"] | {"content_sha256": stored["content_sha256"]} == stored
+    assert said["manifest"]["clips"] == len(UNITS)
+    assert said["clips"] == sorted(release.keys())[:2]
+    print_json(release.store.root, said["clips"][0], 0)
+    clip = json.loads(capsys.readouterr().out)
+    assert clip["meta"]["key"] == said["clips"][0]
+    assert clip["shapes"]["poses"] == [clip["meta"]["frames"], 7]
