@@ -11,7 +11,8 @@ from enum import StrEnum
 _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
 
 _SECRETS = (
-    re.compile(r"(?<=://)[^/@\s]+(?=@)(?=[^/\s]*/|[^/\s]*$)"),  # user:password@host, as of FTP, SFTP and HTTP
+    re.compile(r"(?<=://)[^/@:\s]*:[^/@\s]*(?=@)"),  # user:password@host, as of FTP and SFTP
+    re.compile(r"(?<=https://)[^/@\s]+(?=@)|(?<=http://)[^/@\s]+(?=@)"),  # token@host; elsewhere it names a container
     re.compile(
         r"(?i)(?<=[?&;])(?:x-amz-[a-z-]+|x-goog-[a-z-]+|awsaccesskeyid|signature|sig|sv|se|[a-z_-]*(?:token|key|secret|passw)"
         r"[a-z_-]*)=[^&;\s]*"

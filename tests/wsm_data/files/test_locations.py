@@ -53,7 +53,13 @@ def test_a_path_that_turns_out_to_be_such_a_url_is_refused_without_showing_it(ur
 
 @pytest.mark.parametrize(
     "url",
-    ["s3://bucket/release", "hf://datasets/me/homes@main/v1", "https://host/release?page=2", "/a/b@c"],
+    [
+        "s3://bucket/release",
+        "hf://datasets/me/homes@main/v1",
+        "https://host/release?page=2",
+        "abfs://box@account.dfs.core.windows.net/a",
+        "/a/b@c",
+    ],
 )
 def test_other_urls_are_taken(url):
     require_no_secret(url)
