@@ -9,6 +9,7 @@ from tqdm import tqdm
 from pipelines.stages.verify import require_sound, require_sound_attached
 from wsm_data.access.derived.merge import merge_releases
 from wsm_data.access.release import open_release, read_manifest
+from wsm_data.access.transfer.card import CARD_NAME, dataset_card
 from wsm_data.access.transfer.config import PublishConfig
 from wsm_data.access.transfer.fetch import fetch_release
 from wsm_data.access.transfer.publish import publish_release
@@ -33,7 +34,7 @@ def publish(release: Path, url: str, config: PublishConfig, quiet: bool) -> None
     opened = open_release(release)
     total = sum(shard.bytes for shard in opened.manifest.shards)
     with tqdm(total=total, unit="B", unit_scale=True, desc="publish", disable=quiet, dynamic_ncols=True) as bar:
-        moved = publish_release(release, url, config, {}, bar.update)
+        moved = publish_release(release, url, config, {CARD_NAME: dataset_card(opened).encode()}, bar.update)
     typer.echo(
         f"{url} holds {opened.manifest.name}, {len(opened)} clips: {moved.moved_files} of {moved.files} files were "
         f"sent ({moved.moved_bytes:,} bytes), the others were there"
