@@ -12,6 +12,8 @@ from typing import Generic
 
 from pipelines.running.budget import RefusalCount, count_refusals, over_budget, with_outcome
 from pipelines.running.conflict import conflict, fingerprint
+from pipelines.running.disk.full_disk import full_disk_named
+from pipelines.running.disk.gone_folder import gone_folder_named
 from pipelines.running.engines.choice import Engine
 from pipelines.running.engines.local import run_local
 from pipelines.running.folder import (
@@ -22,9 +24,7 @@ from pipelines.running.folder import (
     read_stage_record,
     write_stage_record,
 )
-from pipelines.running.full_disk import full_disk_named
 from pipelines.running.given_up import reclaiming, require_given_back
-from pipelines.running.gone_folder import gone_folder_named
 from pipelines.running.ledger import LedgerEntry, compact_ledger, is_whole, ledger_appender, read_ledger
 from pipelines.running.options import RunOptions
 from pipelines.running.progress import progress

@@ -21,8 +21,8 @@ from pathlib import Path
 
 import torch
 
+from pipelines.running.disk.full_disk import full_disk_named
 from pipelines.running.folder import locked
-from pipelines.running.full_disk import full_disk_named
 from pipelines.running.interrupts import termination_noted
 from pipelines.training.config import TrainRunConfig
 from pipelines.training.data import training_loader

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 from fake_stages import COPY
 
-from pipelines.running.gone_folder import gone_folder_named
+from pipelines.running.disk.gone_folder import gone_folder_named
 from pipelines.running.options import RunOptions
 from pipelines.running.runner import run_stage
 from wsm_data.errors import WsmError

@@ -5,7 +5,7 @@ import os
 
 import pytest
 
-from pipelines.running.full_disk import full_disk_named
+from pipelines.running.disk.full_disk import full_disk_named
 from wsm_data.errors import WsmError
 
 

@@ -1,0 +1,1 @@
+"""What the disk does to a running stage, as sentences: it is full, or a folder is gone."""
