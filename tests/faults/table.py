@@ -51,11 +51,11 @@ KINDS = (
         "one sentence; no half checkpoint",
         "tests/wsm_model/training/test_checkpoint.py",
     ),
-    ("disk full, in any command", "one sentence; goes on", "tests/pipelines/running/test_full_disk.py"),
+    ("disk full, in any command", "one sentence; goes on", "tests/pipelines/running/disk/test_full_disk.py"),
     (
         "folder of the source or of the run deleted while a stage works",
         "one sentence that names it; goes on",
-        "tests/pipelines/running/test_gone_folder.py",
+        "tests/pipelines/running/disk/test_gone_folder.py",
     ),
     (
         "nothing writable but `--out`",
