@@ -1,8 +1,8 @@
 """A stand-in of the Hugging Face Hub on a free port: data set repositories, large files, commits and reading by ranges.
 
 It speaks what huggingface_hub speaks: `preupload`, git-lfs batches with basic transfers, `commit` as lines of JSON,
-`paths-info`, `tree` and `resolve`. Files above `LARGE_BYTES` are large ones. A token is compared where one is
-wanted.
+`validate-yaml` of a README.md, `paths-info`, `tree` and `resolve`. Files above `LARGE_BYTES` are large ones. A token is
+compared where one is wanted.
 """
 
 import base64
@@ -18,6 +18,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
 import pytest
+import yaml
 
 LARGE_BYTES = 2000
 TOKEN = "hf_" + "x" * 34
@@ -86,6 +87,7 @@ class _Handler(BaseHTTPRequestHandler):
         repository = r"(?P<repository>[^/]+/[^/]+)"
         return {
             r"/api/repos/create": self._create,
+            r"/api/validate-yaml": self._validate,
             rf"/api/datasets/{repository}/preupload/[^/]+": self._preupload,
             rf"/datasets/{repository}\.git/info/lfs/objects/batch": self._batch,
             r"/upload/(?P<oid>\w+)": self._upload,
@@ -102,6 +104,15 @@ class _Handler(BaseHTTPRequestHandler):
         status = 409 if name in self.hub.repositories else 200
         self.hub.repositories.setdefault(name, {})
         self._answer(status, {"url": f"{self.hub.url}/datasets/{name}", "error": "exists"})
+
+    def _validate(self, body: bytes) -> None:
+        card = json.loads(body)["content"]
+        try:
+            is_sound = isinstance(yaml.safe_load(card.split("---")[1]), dict)
+        except (IndexError, yaml.YAMLError):
+            is_sound = False
+        errors = [] if is_sound else [{"message": "the head of the card must be YAML between lines of ---"}]
+        self._answer(200 if is_sound else 400, {"errors": errors, "warnings": []})
 
     def _preupload(self, body: bytes, repository: str) -> None:
         files = [
