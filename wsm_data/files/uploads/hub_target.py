@@ -13,7 +13,7 @@ from wsm_data.files.retries import Answer, RequestConfig, ask
 from wsm_data.files.uploads.local_file import LocalFile
 
 if TYPE_CHECKING:
-    from huggingface_hub import CommitOperationAdd, CommitOperationDelete
+    from huggingface_hub import CommitOperationAdd, CommitOperationDelete, HfApi
     from huggingface_hub.hf_api import RepoFile
 
 HUB_SCHEME = "hf://"
@@ -32,13 +32,9 @@ class HubTarget:
             ConfigError: it is no such URL, it holds a token, or huggingface_hub is not installed.
         """
         require_no_secret(url)
-        try:
-            from huggingface_hub import HfApi
-        except ModuleNotFoundError as error:
-            raise ConfigError(f"{url} needs huggingface_hub: pip install 'wsm[hub]'") from error
+        self._hub = _client(url)
         self._url = url.rstrip("/")
         self._repository, self._revision, self._folder = _parsed(self._url)
-        self._hub = HfApi()
         self._waiting: dict[str, tuple[CommitOperationAdd, LocalFile] | CommitOperationDelete] = {}
         self._is_there = False
 
@@ -142,6 +138,30 @@ class HubTarget:
 
     def _place(self, name: str) -> str:
         return f"{self._folder}/{name}" if self._folder else name
+
+
+def _client(url: str) -> "HfApi":
+    """The client of the hub, which asks for nothing that a mirror of the hub need not know.
+
+    Raises:
+        ConfigError: huggingface_hub is not installed.
+    """
+    try:
+        from huggingface_hub import HfApi
+    except ModuleNotFoundError as error:
+        raise ConfigError(f"{url} needs huggingface_hub: pip install 'wsm[hub]'") from error
+
+    class Client(HfApi):
+        """It makes the commit at once where the library first asks the hub whether the head of README.md is valid.
+
+        A server that does not know that question would fail the whole commit, and so would one that answers it by
+        anything but JSON. The hub looks at the head again in the commit itself, and our card is made, not typed.
+        """
+
+        def _validate_yaml(self, *_: object, **__: object) -> None:
+            pass
+
+    return Client()
 
 
 def _parsed(url: str) -> tuple[str, str | None, str]:

@@ -65,6 +65,17 @@ def test_a_busy_hub_is_asked_again(target, large, hub):
     assert target.holds("shard", large)
 
 
+def test_a_card_is_put_to_a_server_that_cannot_say_whether_its_head_is_valid(target, tmp_path, hub):
+    """huggingface_hub asks `validate-yaml` before a commit of README.md, which the stand-in answers by 404."""
+    (tmp_path / "README.md").write_text("---\nlicense: apache-2.0\n---\n")
+    card = look_at(tmp_path / "README.md", 1 << 20)
+    root = HubTarget("hf://datasets/someone/homes")
+    root.put("README.md", card)
+    root.settle()
+    assert root.holds("README.md", card)
+    assert not any("validate-yaml" in one for one in hub.requests)
+
+
 def test_what_is_removed_is_gone_with_the_next_commit(target, small, hub):
     target.put("index", small)
     target.settle()
