@@ -151,17 +151,16 @@ def _client(url: str) -> "HfApi":
     except ModuleNotFoundError as error:
         raise ConfigError(f"{url} needs huggingface_hub: pip install 'wsm[hub]'") from error
 
-    class Client(HfApi):
-        """It makes the commit at once where the library first asks the hub whether the head of README.md is valid.
+    client = HfApi()
+    # Before a commit the library asks the hub whether the head of README.md is valid. A server that does not know the
+    # question would fail the whole commit, and so would one that answers anything but JSON. The hub looks at the head
+    # again in the commit itself, and our card is made, not typed.
+    client._validate_yaml = _not_asked
+    return client
 
-        A server that does not know that question would fail the whole commit, and so would one that answers it by
-        anything but JSON. The hub looks at the head again in the commit itself, and our card is made, not typed.
-        """
 
-        def _validate_yaml(self, *_: object, **__: object) -> None:
-            pass
-
-    return Client()
+def _not_asked(*_: object, **__: object) -> None:
+    """In the place of a question."""
 
 
 def _parsed(url: str) -> tuple[str, str | None, str]:
