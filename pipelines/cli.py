@@ -17,7 +17,7 @@ from pipelines.commands.command import Command, CommandGroup
 from pipelines.commands.evaluating import group as evaluate
 from pipelines.commands.models import dream
 from pipelines.commands.models import group as models
-from pipelines.commands.runs import clean, retry
+from pipelines.commands.runs import clean, plan, retry
 from pipelines.commands.soundness import audit_latents, check, preflight
 from pipelines.running.interrupts import (
     INTERRUPTED_EXIT_CODE,
@@ -34,6 +34,7 @@ COMMANDS: tuple[Command | CommandGroup, ...] = (
     run.RUN_COMMAND,
     run.DEMO_COMMAND,
     run.STATUS_COMMAND,
+    plan.COMMAND,
     clean.COMMAND,
     retry.COMMAND,
     settings.COMMAND,

@@ -46,7 +46,7 @@ def test_every_option_in_the_documentation_exists(page):
     commands = ("run", "status", "inspect", "film", "verify", "select", "audit", "audit-run", "bench loader")
     commands += ("export tum", "clean", "retry", "export lerobot")
     commands += ("train", "eval nav", "eval slam", "serve", "source describe", "source miniworld", "check", "preflight")
-    commands += ("publish", "fetch", "merge")
+    commands += ("publish", "fetch", "merge", "plan")
     commands += ("audit-latents", "eval clips", "dream", "model export", "model push")
     helped = "".join(CliRunner().invoke(app, [*command.split(), "--help"]).output for command in commands)
     assert options - {one for one in options if one in helped} == set()

@@ -5,7 +5,8 @@ import shutil
 import pytest
 from box_room import along_x
 
-from pipelines.stages.report import REPORT_FILE, stage_summaries
+from pipelines.artifacts.plan_file import Estimate, Plan, write_plan
+from pipelines.stages.report import REPORT_FILE, planned_and_actual, stage_summaries
 from wsm_data.curation.audit.finding import Check
 from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.files.digest import sha256_file
@@ -77,6 +78,26 @@ def test_what_is_pending_is_counted(make_pipeline):
     pipeline.run("index", options={"limit": 1})
     (summary,) = stage_summaries(pipeline.run_folder)
     assert (summary.units, summary.done, summary.pending) == (3, 1, 2)
+
+
+def test_a_plan_is_set_against_what_came_of_it(copied, changed):
+    before = copied.inputs("report")
+    one = Estimate(value=2.0, low=1.0, high=4.0)
+    hours = {"index": one, "encode": one, "score": one, "report": one}
+    counts = {"workers": 1, "measured_workers": 1, "gpus": 0, "containers": 3, "sampled_containers": 3}
+    known = {"recipe": "r", "source": "s", "bytes_in": 1, "sampled_bytes": 1}
+    plan = Plan(**counts, **known, bytes_out=one, peak_disk_bytes=one, hours=one, stage_hours=hours)
+    write_plan(copied.run_folder, plan)
+    assert changed(before, copied.inputs("report")) == {"report": {"stages"}}
+    stages = stage_summaries(copied.run_folder)
+    rows = {row.name: row for row in planned_and_actual(copied.run_folder, copied.release, stages)}
+    assert list(rows) == ["index, s", "encode, s", "score, s", "release, MiB", "run folder, MiB"]
+    assert (rows["encode, s"].low, rows["encode, s"].value, rows["encode, s"].high) == (3600.0, 7200.0, 14400.0)
+    assert rows["encode, s"].actual == {one.name: one.wall_seconds for one in stages}["encode"]
+    assert rows["score, s"].actual is None  # it never ran
+    size = sum(path.stat().st_size for path in copied.release.rglob("*") if path.is_file())
+    assert rows["release, MiB"].actual == pytest.approx(size / 2**20)
+    assert rows["release, MiB"].off == pytest.approx(size / 2 - 1)
 
 
 def test_a_folder_that_holds_no_run_has_no_stages(tmp_path):

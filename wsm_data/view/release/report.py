@@ -100,6 +100,7 @@ def report_html(data: ReportData, release: Release) -> str:
             cards=[_card(number, one, data.survey) for number, one in enumerate(data.survey.thumbnails)],
             audit=_audit(data),
             stages=data.stages,
+            planned=data.planned,
             stage_svg=_stage_svg(data) if data.stages else None,
         )
 

@@ -42,6 +42,30 @@ class StageSummary:
         return self.done / self.wall_seconds if self.wall_seconds else None
 
 
+@dataclass(frozen=True, kw_only=True)
+class Planned:
+    """A number that was planned before the run, beside what came of it.
+
+    Attributes:
+        name: what it is of, with its unit.
+        value: what was expected.
+        low: lower bound of what was expected.
+        high: upper bound.
+        actual: what came of it; None where that is not known.
+    """
+
+    name: str
+    value: float
+    low: float
+    high: float
+    actual: float | None
+
+    @property
+    def off(self) -> float | None:
+        """What came beyond what was expected, as a share of that; None where one of the two is not known or 0."""
+        return None if self.actual is None or not self.value else self.actual / self.value - 1
+
+
 def covered_seconds(spans: Iterable[tuple[float, float]]) -> float:
     """Length of the union of spans of time (begin, end), s."""
     total, reached = 0.0, -inf
@@ -59,8 +83,10 @@ class ReportData:
         survey: numbers and pictures of clips.
         stages: the stages in the order of the flow; empty when the folder of the run is not at hand.
         audit: what leaks, is there twice or contradicts itself, worst first; None where nobody looked.
+        planned: what `wsm plan` said beforehand; empty where no plan was made.
     """
 
     survey: ClipSurvey
     stages: tuple[StageSummary, ...] = ()
     audit: tuple[AuditFinding, ...] | None = None
+    planned: tuple[Planned, ...] = ()
