@@ -88,14 +88,14 @@ def _train(
     rank, _ = rank_and_world_size()
     run, model = started.run, started.model
     done = resume(run, loader)
-    if rank == 0:  # only now is it certain that the folder is this run's
-        write_text(out / "run.json", json.dumps(dataclasses.asdict(config), indent=1, sort_keys=True) + "\n")
-        save_card(out / CHECKPOINTS, started.card)
-    wait_for_all()
     with (
         termination_noted() as must_stop,
         run_hooks(config, out, started, done=done, device=device, quiet=quiet, must_stop=must_stop) as hooks,
     ):
+        if rank == 0:  # only now is it certain that the folder is this run's, and that nothing is refused any more
+            write_text(out / "run.json", json.dumps(dataclasses.asdict(config), indent=1, sort_keys=True) + "\n")
+            save_card(out / CHECKPOINTS, started.card)
+        wait_for_all()
         model.checkpoint_activations = config.training.checkpoint_activations
         if config.training.compile:
             compile_blocks(model)

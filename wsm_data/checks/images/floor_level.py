@@ -20,6 +20,10 @@ LEAST_SHARE = 0.25
 MIN_FOUND = 0.15
 """At the other height so many of all points lie, or there is no floor at all to be seen."""
 
+MAX_BENEATH = 0.1
+"""A floor has nothing beneath it, but for noise and a step down: no floor is where more of all points lie lower.
+Walls and furniture that fill the view have points at all heights."""
+
 _RATIOS = np.arange(0.3, 1.7 + 1e-9, 0.01)
 
 
@@ -41,9 +45,16 @@ def check_floor_level(drop_m: Float64Array, height_m: Float64Array, slope: Float
     support = (np.searchsorted(ratio, _RATIOS + NEAR) - np.searchsorted(ratio, _RATIOS - NEAR)) / len(ratio)
     own = float(np.searchsorted(ratio, 1 + NEAR) - np.searchsorted(ratio, 1 - NEAR)) / len(ratio)
     best = int(np.argmax(support))
-    measured |= {"floor_share": own, "best_share": float(support[best]), "best_height_ratio": float(_RATIOS[best])}
-    limits = {"floor_share": LEAST_SHARE * float(support[best])}
-    if support[best] < MIN_FOUND or own >= LEAST_SHARE * support[best]:
+    beneath = 1 - float(np.searchsorted(ratio, _RATIOS[best] + 2 * NEAR)) / len(ratio)
+    measured |= {
+        "floor_share": own,
+        "best_share": float(support[best]),
+        "best_height_ratio": float(_RATIOS[best]),
+        "share_beneath": beneath,
+    }
+    limits = {"floor_share": LEAST_SHARE * float(support[best]), "share_beneath": MAX_BENEATH}
+    is_floor = support[best] >= MIN_FOUND and beneath <= MAX_BENEATH
+    if not is_floor or own >= LEAST_SHARE * support[best]:
         return Verdict(measured=measured, limits=limits)
     message = (
         f"{where}: the floor must lie as far below the camera as its mount says, to {NEAR:.0%}, and {own:.0%} of the "

@@ -5,6 +5,7 @@ a sound video the way from before to after leads through what lies between. Of l
 camera may turn to the side and back.
 """
 
+import cv2
 import numpy as np
 
 from wsm_data.errors import Reason
@@ -17,7 +18,9 @@ RATIO = 2.0
 NOISE = 0.15
 """beyond this distance, in standard deviations of an image: what noise and compression make of the same view."""
 
-LATTICE_PX = 12
+BLOCK_PX = 12
+"""An image is told by the means of blocks of such a side: single pixels on a lattice are met by the rim of a door for
+the length of one frame, all of a column at once."""
 
 
 def check_frame_order(video: Float32Array, kind: str, where: str) -> Verdict:
@@ -44,8 +47,10 @@ def check_frame_order(video: Float32Array, kind: str, where: str) -> Verdict:
 
 
 def signatures(video: Float32Array) -> Float32Array:
-    """Frames on a lattice, each of mean zero and deviation one whatever its exposure; float32 [T, N]."""
-    marks = video[:, LATTICE_PX // 2 :: LATTICE_PX, LATTICE_PX // 2 :: LATTICE_PX].reshape(len(video), -1)
+    """Means of blocks of each frame, of mean zero and deviation one whatever its exposure; float32 [T, N]."""
+    _, height, width = video.shape
+    rows, columns = max(1, height // BLOCK_PX), max(1, width // BLOCK_PX)
+    marks = np.stack([cv2.resize(one, (columns, rows), interpolation=cv2.INTER_AREA).ravel() for one in video])
     centred = marks - marks.mean(axis=1, keepdims=True)
     spread = centred.std(axis=1, keepdims=True)
     return (centred / np.where(spread > 1e-3, spread, np.inf)).astype(np.float32)

@@ -47,6 +47,14 @@ def test_a_frame_of_one_colour_is_found(value):
     assert found(video).measured["frame"] == 20
 
 
+def test_the_rim_of_a_door_that_is_nearer_for_one_frame_is_no_foreign_image():
+    """It covers half a block more for the length of a frame, as where the camera wavers."""
+    scene = np.full((FRAMES, 96, 160), 0.5, np.float32)
+    scene[:, :, 104:] = -1.0
+    scene[12, :, 98:104] = -1.0
+    assert found(scene).keep
+
+
 def test_two_frames_that_were_exchanged_are_found():
     video = VIDEO.copy()
     video[[5, 22]] = video[[22, 5]]

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from wsm_data.checks.images.time_offset import MIN_PAIRS, check_time_offset
+from wsm_data.checks.images.time_offset import MIN_PAIRS, PairCosts, check_time_offset, is_clear, partial_offset
 from wsm_data.errors import Reason
 from wsm_data.schema.camera import Intrinsics
 from wsm_data.schema.depth import DepthRange
@@ -69,6 +69,24 @@ def test_a_frame_that_was_dropped_is_found_where_it_is_missing(swaying):
     assert verdict.measured["offset_frames"] == 1
     assert abs(verdict.measured["first_frame"] - 30) <= 2  # within the frames that look alike
     assert "in frames 2" in verdict.message or "in frames 3" in verdict.message
+
+
+@pytest.mark.parametrize(("told", "shape"), [(True, "edge"), (False, "hill")])
+def test_a_slip_begins_and_ends_from_one_pair_to_the_next(told, shape):
+    """Pairs of 6 frames, one a frame; from frame 30 on another pose suits those across it, or their neighbours too."""
+    first = np.arange(3, 53)
+    across = (first < 30) & (first + 6 >= 30)
+    hill = np.clip(1 - np.abs(first - 26.5) / 20, 0, 1)
+    costs = np.full((len(first), 19), 0.5)
+    costs[:, 7] = np.where(across, 0.2, 0.8) if shape == "edge" else 0.5 - 0.3 * hill
+    pairs = PairCosts(first=first, lag=6, change=0.0, costs=costs)
+    offset = partial_offset(pairs, 60)
+    assert offset.votes == 1.0
+    assert offset.gain >= 0.3
+    assert is_clear(offset, pairs) is told
+    if told:
+        assert (offset.start, offset.stop) == (30, 60)
+        assert offset.contrast == pytest.approx(0.6)
 
 
 def test_a_slip_is_told_under_jitter_and_jitter_is_no_slip(swaying, room_video):
