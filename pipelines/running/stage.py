@@ -163,6 +163,8 @@ def require_inside(outputs: Iterable[str]) -> None:
         ValueError: a name leads out of the folder, or is none.
     """
     for output in outputs:
+        if output and output[0] not in "/." and ".." not in output:  # of a million, all but a few
+            continue
         path = PurePosixPath(output)
         if path.is_absolute() or ".." in path.parts or not path.parts:
             raise ValueError(f"outputs must lie inside the folder, found {output!r}")

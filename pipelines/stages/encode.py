@@ -97,6 +97,7 @@ def _list_units(config: EncodeConfig) -> Sequence[Unit]:
     maps = done_outcomes(config.map)
     refused_maps = {refusal.unit: refusal for refusal in quarantine_of(config.map)}
     units = []
+    scenes: dict[str, _SceneInput] = {}
     for row in read_episodes(config.index):
         without = refused_maps.get(row.container)
         if without is not None:
@@ -104,8 +105,10 @@ def _list_units(config: EncodeConfig) -> Sequence[Unit]:
             map_digest = f"refused {without.reason}"
         elif row.container in maps:
             indexed, mapped = containers[row.container], maps[row.container]
-            container = from_json(Container, indexed.facts["container"])
-            scene = _SceneInput(container=container, indexed=indexed, mapped=mapped)
+            if row.container not in scenes:
+                container = from_json(Container, indexed.facts["container"])
+                scenes[row.container] = _SceneInput(container=container, indexed=indexed, mapped=mapped)
+            scene = scenes[row.container]
             map_digest = level_digest(mapped.facts, row.floor_z_m)
         else:
             continue  # its map is pending, and so is the trajectory

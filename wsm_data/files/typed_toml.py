@@ -7,7 +7,7 @@ import tomllib
 import types
 import typing
 from collections.abc import Iterable, Mapping
-from dataclasses import MISSING, Field, fields, is_dataclass
+from dataclasses import MISSING, fields, is_dataclass
 from enum import Enum
 from functools import cache
 from pathlib import Path
@@ -91,13 +91,16 @@ def build_config(config_type: type[ConfigT], values: Mapping[str, Any], where: s
     Raises:
         ConfigError: an unknown key (with the nearest name), a missing one, or a value the type does not take.
     """
-    hints, known = _type_hints(config_type), _fields(config_type)  # type: ignore[arg-type]
-    for key in values:
-        if key not in known:
-            raise ConfigError(f"unknown key {dotted(where, key)}; {did_you_mean(key, known, where)}")
-    arguments = {key: convert(hints[key], value, dotted(where, key)) for key, value in values.items()}
-    for name, field in known.items():
-        if name not in arguments and field.default is MISSING and field.default_factory is MISSING:
+    hints, required = _type_hints(config_type), _required(config_type)  # type: ignore[arg-type]
+    arguments = {}
+    for key, value in values.items():
+        hint = hints.get(key, MISSING)
+        if hint is MISSING:
+            raise ConfigError(f"unknown key {dotted(where, key)}; {did_you_mean(key, hints, where)}")
+        is_plain = hint is Any or (type(value) is hint and hint in _EXACT)  # most of the many that stand beside clips
+        arguments[key] = value if is_plain else convert(hint, value, dotted(where, key))
+    for name in required:
+        if name not in arguments:
             raise ConfigError(f"{dotted(where, name)} has no default: give it as {dotted(where, name)}=...")
     try:
         return config_type(**arguments)
@@ -113,14 +116,14 @@ def convert(hint: Any, value: Any, name: str) -> Any:
     Raises:
         ConfigError: the type does not take the value; `name` says which field that is.
     """
-    if hint is Any or (type(value) is hint and hint in _EXACT):  # most of the many values that stand beside clips
+    if hint is Any or (type(value) is hint and hint in _EXACT):
         return value
-    origin = typing.get_origin(hint)
-    if is_dataclass(hint):
+    origin = _origin(hint)
+    if _is_section(hint):
         return build_config(typing.cast(type, hint), _section(value, name), name)
     if origin is Mapping:
         value = _toml_value(value) if isinstance(value, Word) else value
-        of_items = typing.get_args(hint)[1]
+        of_items = _arguments(hint)[1]
         return {key: convert(of_items, item, dotted(name, key)) for key, item in _section(value, name).items()}
     if origin is tuple:
         return _convert_tuple(hint, value, name)
@@ -153,13 +156,32 @@ def dotted(where: str, key: str) -> str:
 
 
 @cache
-def _fields(config_type: type) -> dict[str, Field[Any]]:
-    return {field.name: field for field in fields(config_type)}
+def _required(config_type: type) -> tuple[str, ...]:
+    """Names of the fields without a default."""
+    return tuple(
+        field.name for field in fields(config_type) if field.default is MISSING and field.default_factory is MISSING
+    )
+
+
+@cache
+def _is_section(hint: Any) -> bool:
+    return is_dataclass(hint)
+
+
+@cache
+def _origin(hint: Any) -> Any:
+    return typing.get_origin(hint)
+
+
+@cache
+def _arguments(hint: Any) -> tuple[Any, ...]:
+    return typing.get_args(hint)
 
 
 @cache
 def _type_hints(config_type: type) -> dict[str, Any]:
-    return typing.get_type_hints(config_type)
+    hints = typing.get_type_hints(config_type)
+    return {field.name: hints[field.name] for field in fields(config_type)}
 
 
 def _section(value: Any, name: str) -> Mapping[str, Any]:
@@ -190,7 +212,7 @@ def _convert_tuple(hint: Any, value: Any, name: str) -> tuple[Any, ...]:
         value = listed if isinstance(listed, list) else [value]
     if not isinstance(value, (list, tuple)):
         raise ConfigError(f"{name} takes a list in brackets, found {value!r}")
-    of_items = typing.get_args(hint)
+    of_items = _arguments(hint)
     if len(of_items) == 2 and of_items[1] is Ellipsis:
         if of_items[0] is float and all(type(item) is float and math.isfinite(item) for item in value):
             return tuple(value)
@@ -201,8 +223,9 @@ def _convert_tuple(hint: Any, value: Any, name: str) -> tuple[Any, ...]:
 
 
 def _convert_union(hint: Any, value: Any, name: str) -> Any:
-    choices = [choice for choice in typing.get_args(hint) if choice is not type(None)]
-    if value is None or (value == "none" and len(choices) < len(typing.get_args(hint))):
+    kinds = _arguments(hint)
+    choices = [choice for choice in kinds if choice is not type(None)]
+    if value is None or (value == "none" and len(choices) < len(kinds)):
         return None
     return convert(choices[0], value, name)
 
