@@ -12,7 +12,7 @@ import typer
 from typer.core import TyperGroup
 
 from pipelines.commands import audit, audit_run, bench, inspect, run, serve, settings, source, stages, stores, train
-from pipelines.commands.clips import export, film
+from pipelines.commands.clips import export, film, view
 from pipelines.commands.command import Command, CommandGroup
 from pipelines.commands.evaluating import group as evaluate
 from pipelines.commands.models import dream
@@ -42,6 +42,7 @@ COMMANDS: tuple[Command | CommandGroup, ...] = (
     stores.FETCH_COMMAND,
     stores.MERGE_COMMAND,
     inspect.COMMAND,
+    view.COMMAND,
     film.COMMAND,
     export.GROUP,
     audit_run.COMMAND,

@@ -35,6 +35,8 @@ ONLY_IMPORTED_IN = {
     "diffusers": ("wsm_data/codecs/wan.py", "wsm_model/"),
     "matplotlib": ("wsm_data/view/",),
     "jinja2": ("wsm_data/view/",),
+    "starlette": ("wsm_data/view/browser/",),
+    "uvicorn": ("pipelines/operations/clips/view.py",),
     # the peers we are measured against belong to bench/
     "casadi": (),
     "embreex": (),
