@@ -203,7 +203,7 @@ class Release:
             IntegrityError: as `read_clip`.
         """
         where = f"{row.shard}, clip {row.key}"
-        data, members = read_members(self.shards, row)
+        data, members = read_members(self.shards, self._in_its_shard(row))
         clip = decode_clip(data, members, where)
         if (clip.meta.key, clip.meta.codec_digest) != (row.key, self.manifest.codec.digest):
             raise IntegrityError(
@@ -219,7 +219,7 @@ class Release:
             ConfigError: the release has no such clip.
             IntegrityError: as `read_clip`.
         """
-        return read_members(self.shards, self.index.row(key))[0]
+        return read_members(self.shards, self._in_its_shard(self.index.row(key)))[0]
 
     def read_member(self, row: IndexRow, name: str) -> memoryview:
         """Read what one member of a clip holds, an array or the meta data, without the rest of the clip.
@@ -227,7 +227,7 @@ class Release:
         Raises:
             IntegrityError: as `read_clip`.
         """
-        data, [member] = read_members(self.shards, row, (name,))
+        data, [member] = read_members(self.shards, self._in_its_shard(row), (name,))
         return content_of(data, member)
 
     def require_codec(self, codec: CodecInfo) -> None:
@@ -254,6 +254,16 @@ class Release:
         """Every refusal with reason, message and details, sorted by unit."""
         data = checked_file(self.store, QUARANTINE_NAME, self.manifest.quarantine_sha256)
         return parse_quarantine(data, f"{self.store.root}/{QUARANTINE_NAME}")
+
+    def _in_its_shard(self, row: IndexRow) -> IndexRow:
+        """The row, if its shard can hold the clip: memory for it is taken before its bytes are read."""
+        end, size = row.clip_offset + row.clip_size, self.manifest.shard_bytes.get(row.shard, 0)
+        if end > size:
+            raise IntegrityError(
+                f"{row.shard}, clip {row.key}: the index places it up to byte {end}, but by the manifest the shard has "
+                f"{size} bytes; restore {INDEX_NAME} and {MANIFEST_NAME}"
+            )
+        return row
 
     @cached_property
     def _codecs(self) -> dict[str, VideoCodec]:

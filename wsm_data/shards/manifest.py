@@ -3,6 +3,7 @@
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 from wsm_data.errors import IntegrityError
@@ -14,6 +15,9 @@ from wsm_data.shards.names import MANIFEST_NAME, is_shard_name
 from wsm_data.shards.statistics import LatentStatistics
 
 RELEASE_SCHEMA_VERSION = 1
+
+MIN_CLIP_BYTES = 5 * 1024
+"""What the least clip takes in a shard: five members, each with a block of header and one of content."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,6 +41,8 @@ class ShardInfo:
     def __post_init__(self) -> None:
         if not is_shard_name(self.name):  # it becomes a path, of a release and of caches
             raise ValueError(f"a shard must have a name such as train-000000.tar, found {self.name!r}")
+        if not 0 <= self.clips * MIN_CLIP_BYTES <= self.bytes:  # whoever reads it allocates by these numbers
+            raise ValueError(f"{self.name} of {self.bytes} bytes cannot hold {self.clips} clips")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,6 +102,11 @@ class ReleaseManifest:
     parent: str | None = None
     partial: bool = False
     schema_version: int = RELEASE_SCHEMA_VERSION
+
+    @cached_property
+    def shard_bytes(self) -> Mapping[str, int]:
+        """Size of each shard by its name."""
+        return {shard.name: shard.bytes for shard in self.shards}
 
 
 def manifest_bytes(manifest: ReleaseManifest) -> bytes:

@@ -140,9 +140,14 @@ ARCHIVES = (
         place=f"{GROUP}/bad.tar",
     ),
     archive(
-        "a scene at another depth",
-        "container.no_episodes",
+        "a scene at another depth under the archive's name",
+        "",
         lambda: gzip.compress(archive_of(*members("a/b/c/bad/")), 1),
+    ),
+    archive(
+        "a scene at another depth under another name",
+        "container.no_episodes",
+        lambda: gzip.compress(archive_of(*members("a/b/c/other/")), 1),
     ),
     archive(
         "names with backslashes",

@@ -44,6 +44,17 @@ def test_a_release_is_read_and_verified_from_a_store(in_memory: str, tiny: Simpl
     assert verify_release(in_memory) == []
 
 
+def test_a_clip_that_reaches_beyond_its_shard_is_refused_before_memory_is_taken(tiny: SimpleNamespace) -> None:
+    release = open_release(tiny.folder)
+    row = release.index.row_at(0)
+    less = row.clip_offset + row.clip_size - 1
+    shards = tuple(replace(shard, clips=0, bytes=less) for shard in release.manifest.shards)
+    short = replace(release, manifest=replace(release.manifest, shards=shards))
+    for read in (short.read_clip, short.read_clip_bytes, lambda _: short.read_member(row, "poses")):
+        with pytest.raises(IntegrityError, match=f"by the manifest the shard has {less} bytes"):
+            read(row.key)
+
+
 def test_a_clip_costs_one_ranged_read_and_no_copy(tiny: SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> None:
     release = open_release(tiny.folder)
     reads: list[memoryview] = []

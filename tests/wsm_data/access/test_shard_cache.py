@@ -17,7 +17,7 @@ KIB = 1024
 
 
 def shard(number, size=KIB):
-    return ShardInfo(name=f"train-{number:06d}.tar", split="train", clips=1, bytes=size, sha256="")
+    return ShardInfo(name=f"train-{number:06d}.tar", split="train", clips=0, bytes=size, sha256="")
 
 
 def put(cache, *shards):
@@ -118,7 +118,7 @@ from pathlib import Path
 from wsm_data.access.shard_cache import ShardCache
 from wsm_data.shards.manifest import ShardInfo
 folder, digest, name, size = sys.argv[1:]
-shard = ShardInfo(name=name, split="train", clips=1, bytes=int(size), sha256="")
+shard = ShardInfo(name=name, split="train", clips=0, bytes=int(size), sha256="")
 with ShardCache(Path(folder), digest, 3072).reserved(shard) as file:
     file.write(bytes(int(size) // 2))
     print("half", flush=True)

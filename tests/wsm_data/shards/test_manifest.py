@@ -36,6 +36,13 @@ def test_another_schema_version_is_refused_with_both_numbers(tiny: SimpleNamespa
         parse_manifest(data, "there")
 
 
+def test_a_shard_without_room_for_its_clips_is_refused_before_anything_is_taken_for_them(tiny: SimpleNamespace) -> None:
+    record = json.loads(manifest_bytes(tiny.manifest))
+    record["shards"][0]["clips"] = 10**9
+    with pytest.raises(IntegrityError, match="cannot hold 1000000000 clips"):
+        parse_manifest(json.dumps(record).encode(), "there")
+
+
 def _changed(change: Callable[[dict[str, Any]], object]) -> Callable[[bytes], bytes]:
     def apply(data: bytes) -> bytes:
         record = json.loads(data)

@@ -13,14 +13,15 @@ from typing import Any
 import numpy as np
 
 from wsm_data.access.release import Release, open_release
-from wsm_data.errors import ConfigError
+from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.files.digest import sha256_bytes
 from wsm_data.loaders.config import OrderConfig, SourceConfig
 from wsm_data.loaders.order.epoch_order import EpochOrder, order_epoch
 from wsm_data.loaders.order.pass_order import SourceLayout
 from wsm_data.schema.arrays import Int64Array
 from wsm_data.shards.index.row import IndexRow
-from wsm_data.shards.names import TRAIN_SPLIT
+from wsm_data.shards.members import STORED_DTYPES
+from wsm_data.shards.names import INDEX_NAME, TRAIN_SPLIT
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -57,11 +58,17 @@ class SourceTable:
 
     @cached_property
     def layout(self) -> SourceLayout:
-        """What the order of the source depends on."""
+        """What the order of the source depends on.
+
+        Raises:
+            IntegrityError: by the index a clip has more latents than any shard has room for.
+        """
         codes = self.shard_codes
         starts = np.flatnonzero(np.concatenate([[True], codes[1:] != codes[:-1]])) if len(codes) else codes
         shard_clips = np.diff(np.append(starts, len(codes))).astype(np.int64)
-        return SourceLayout(shard_clips=shard_clips, latents=self.column("latents"), weight=self.config.weight)
+        latents = self.column("latents")
+        _require_room(self.release, int(latents.max(initial=0)))
+        return SourceLayout(shard_clips=shard_clips, latents=latents, weight=self.config.weight)
 
     def column(self, name: str) -> np.ndarray:
         """An integer column of the index for the clips of the source, such as `rgb_latent_offset`; [clips]. Kept."""
@@ -103,6 +110,19 @@ class SourceTable:
 
     def _of_source(self, column: np.ndarray) -> np.ndarray:
         return column if self._has_all_rows else column[self.rows]
+
+
+def _require_room(release: Release, latents: int) -> None:
+    """Batches take their memory by the lengths that the index states, before anything is read."""
+    manifest, ratio = release.manifest, release.manifest.codec.spatial_ratio
+    cells = (manifest.encoded_height_px // ratio) * (manifest.encoded_width_px // ratio)
+    wanted = latents * manifest.codec.channels * cells * STORED_DTYPES["rgb_latent"].itemsize
+    largest = max(manifest.shard_bytes.values(), default=0)
+    if wanted > largest:
+        raise IntegrityError(
+            f"{release.store.root}: by {INDEX_NAME} a clip has {latents} latents, which take {wanted} bytes, but the "
+            f"largest shard has {largest}; restore {INDEX_NAME}"
+        )
 
 
 @dataclass(frozen=True, eq=False)

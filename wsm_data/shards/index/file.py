@@ -13,7 +13,7 @@ import pyarrow.parquet as pq
 
 from wsm_data.errors import IntegrityError
 from wsm_data.files.tables import opened_table, require_columns
-from wsm_data.shards.index.row import INDEX_VERSION, SCHEMA
+from wsm_data.shards.index.row import CHECKSUM_COLUMNS, INDEX_VERSION, SCHEMA
 from wsm_data.shards.row_blocks import RowBlocks
 
 OpenFile = Callable[[], pa.NativeFile]
@@ -40,6 +40,7 @@ class IndexFile:
                 raise ValueError(f"wsm.index_version must be {INDEX_VERSION}; use a matching wsm")
             require_columns(file.schema_arrow, SCHEMA)
             self._metadata = file.metadata
+            _require_rows(file.metadata.num_rows, self._size_bytes())
             sizes = [file.metadata.row_group(number).num_rows for number in range(file.num_row_groups)]
         self._starts = [0, *accumulate(sizes)]
         self._blocks: dict[tuple[str, ...], RowBlocks] = {}  # a program asks for few choices of columns
@@ -81,9 +82,20 @@ class IndexFile:
         with self._opened() as file:
             return self._starts[groups[0]], file.read_row_groups(groups, list(names)).select(list(names))
 
+    def _size_bytes(self) -> int:
+        with self._open_file() as file:
+            return int(file.size())
+
     def _opened(self) -> AbstractContextManager[pq.ParquetFile]:
         must_be = f"{self._where} must be the index of a release"
         return opened_table(self._open_file, must_be, "restore the file", self._metadata)
+
+
+def _require_rows(rows: int, size_bytes: int) -> None:
+    """Rows are believed before they are read: a file cannot have more of them than it has room for their checksums."""
+    most = size_bytes // (8 * len(CHECKSUM_COLUMNS))
+    if rows > most:
+        raise ValueError(f"a file of {size_bytes} bytes must have at most {most} rows, and declares {rows}")
 
 
 @contextmanager

@@ -42,7 +42,7 @@ PLACE_COLUMNS = (
     "clip_size",
     *(f"{name}_{what}" for name in MEMBER_NAMES for what in ("offset", "size")),
 )
-_CHECKSUMS = tuple(f"{name}_checksum" for name in MEMBER_NAMES)
+CHECKSUM_COLUMNS = tuple(f"{name}_checksum" for name in MEMBER_NAMES)
 _METADATA = {
     "wsm.index_version": INDEX_VERSION,
     "wsm.members": canonical_json(
@@ -58,7 +58,7 @@ SCHEMA = pa.schema(
     + [(name, pa.dictionary(pa.int32(), pa.string())) for name in REPEATED_COLUMNS]
     + [(name, pa.int32()) for name in COUNT_COLUMNS]
     + [(name, pa.int64()) for name in PLACE_COLUMNS]
-    + [(name, pa.uint64()) for name in _CHECKSUMS],
+    + [(name, pa.uint64()) for name in CHECKSUM_COLUMNS],
     metadata=_METADATA,
 )
 

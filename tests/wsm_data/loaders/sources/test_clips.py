@@ -1,6 +1,7 @@
 import pickle
 import shutil
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -10,7 +11,7 @@ import pyarrow as pa
 import pytest
 
 from wsm_data.access.release import open_release
-from wsm_data.errors import ConfigError
+from wsm_data.errors import ConfigError, IntegrityError
 from wsm_data.loaders.config import OrderConfig, SourceConfig
 from wsm_data.loaders.sources.clips import open_sources
 from wsm_data.shards.manifest import manifest_bytes
@@ -45,6 +46,19 @@ def test_a_source_has_the_clips_of_its_split_in_the_order_of_the_index(config: S
         assert sources.keys(range(sources.clips)) == keys
     everything = open_sources([replace(config, split="")])
     assert everything.keys(range(everything.clips)) == index.texts("key")
+
+
+def test_a_clip_that_no_shard_has_room_for_is_refused_before_a_batch_takes_memory_for_it(config: SourceConfig) -> None:
+    """RGB latents of a clip take two bytes for each of their values."""
+    [table] = open_sources([config]).tables
+    longest = int(table.column("latents").max())
+    channels = table.release.manifest.codec.channels
+    cells = table.release.manifest.encoded_height_px * table.release.manifest.encoded_width_px // 16**2
+    for room, is_kept in ((longest * channels * cells * 2, True), (longest * channels * cells * 2 - 1, False)):
+        shards = tuple(replace(shard, clips=0, bytes=room) for shard in table.release.manifest.shards)
+        release = replace(table.release, manifest=replace(table.release.manifest, shards=shards))
+        with nullcontext() if is_kept else pytest.raises(IntegrityError, match=f"a clip has {longest} latents"):
+            assert len(replace(table, release=release).layout.latents) == len(table)
 
 
 def test_refs_count_over_all_sources(config: SourceConfig) -> None:

@@ -102,3 +102,15 @@ def test_a_file_is_opened_again_only_as_it_was(path: Path, tmp_path: Path) -> No
         open_again()
     with pytest.raises(FileNotFoundError), local_file(str(tmp_path / "nowhere")):
         pass
+
+
+def test_more_rows_than_the_file_has_room_for_are_refused_before_any_is_read(
+    tiny: SimpleNamespace, tmp_path: Path
+) -> None:
+    """A million rows alike take 100 KB by run lengths; read, they would take 460 MB. Checksums are 64 bytes a row."""
+    one = pq.read_table(tiny.folder / INDEX_NAME, schema=SCHEMA).slice(0, 1)
+    path = tmp_path / "bomb.parquet"
+    pq.write_table(one.take(pa.array(np.zeros(1_000_000, np.int64))), path, compression="zstd")
+    most = path.stat().st_size // 64
+    with pytest.raises(IntegrityError, match=f"at most {most} rows, and declares 1000000"):
+        open_it(path)
