@@ -18,12 +18,17 @@ def verify(
             "--payload/--no-payload", help="Read every shard; without: sizes, and the checksums that a store states."
         ),
     ] = True,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print all findings as JSON, without --out. Exit code 4 where there are any.")
+    ] = False,
 ) -> None:
     """Verify a release."""
     from pipelines.operations.run_stage import run_one
-    from pipelines.operations.verify import verify_stored, verify_without_record
+    from pipelines.operations.verify import verify_as_json, verify_stored, verify_without_record
 
-    if not payload:
+    if as_json:
+        verify_as_json(release, request, payload)
+    elif not payload:
         verify_stored(release, request)
     elif request.out is None:
         verify_without_record(release, request)

@@ -1,13 +1,15 @@
 """`wsm verify` without a folder: every byte is read, or none of the shards, and nothing is recorded."""
 
+import json
 from dataclasses import fields
 
 import typer
 
 from pipelines.running.options import RunOptions, StageRequest
-from pipelines.stages.verify import require_no_finding, require_sound
+from pipelines.stages.verify import require_no_finding, require_sound, sound_findings
 from wsm_data.access.transfer.stored import check_stored
-from wsm_data.errors import ConfigError
+from wsm_data.errors import ConfigError, IntegrityError
+from wsm_data.files.json_values import to_json
 
 
 def verify_without_record(release: str, request: StageRequest) -> None:
@@ -39,6 +41,28 @@ def verify_stored(release: str, request: StageRequest) -> None:
         f"{release} has all {check.shards} shards in their sizes, {by}; index, inventory and quarantine were read. No "
         "clip was read: `wsm verify` without --no-payload does that"
     )
+
+
+def verify_as_json(release: str, request: StageRequest, payload: bool) -> None:
+    """Print all that is wrong with a release as JSON: an empty list where it is whole.
+
+    Args:
+        release: folder or URL of the release.
+        request: what else was asked for.
+        payload: whether shards are read, or only what a store says of them.
+
+    Raises:
+        ConfigError: there is no such folder, or an option is given that would do nothing.
+        IntegrityError: something was found; it is printed already.
+    """
+    _refuse_unused(request)
+    if request.out is not None:
+        raise ConfigError("--json is for a release that is verified without a record: leave out --out")
+    findings = sound_findings(release, request.options.quiet) if payload else check_stored(release).findings
+    record = {"release": release, "payload": payload, "whole": not findings, "findings": to_json(list(findings))}
+    typer.echo(json.dumps(record, indent=2))
+    if findings:
+        raise IntegrityError(f"{release} is damaged, {len(findings)} finding{'s' if len(findings) > 1 else ''}")
 
 
 def _refuse_unused(request: StageRequest) -> None:
