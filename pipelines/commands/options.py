@@ -23,6 +23,10 @@ Gpus = Annotated[
     int, typer.Option("--gpus", min=0, help="GPUs that encode for all workers; 0: each worker has its own codec.")
 ]
 Engine = Annotated[EngineName, typer.Option("--engine", help="Where workers run: this machine, ray or Slurm.")]
+Slurm = Annotated[
+    list[str] | None,
+    typer.Option("--slurm", help="With --engine slurm, what a job asks for: partition=gpu, time_min=120. Repeatable."),
+]
 Limit = Annotated[int, typer.Option("--limit", min=0, help="At most this many pending units; 0: all.")]
 Only = Annotated[
     list[str] | None, typer.Option("--only", help="Only units whose id matches, as 'gibson_*/*'. Repeatable.")

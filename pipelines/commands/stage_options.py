@@ -23,6 +23,7 @@ from pipelines.commands.options import (
     Release,
     RetryReasons,
     RetryRefused,
+    Slurm,
     Verbose,
     Workers,
 )
@@ -35,6 +36,7 @@ _OF_REQUEST: Mapping[str, object] = {
     "config": Config,
     "assignments": Assignments,
     "engine": Engine,
+    "slurm": Slurm,
     "log_file": LogFile,
 }
 _OF_RUN: Mapping[str, object] = {
@@ -68,7 +70,7 @@ def reading(run: Callable[..., None]) -> Callable[..., None]:
 def stage_request(values: Mapping[str, Any]) -> StageRequest:
     """The options of a command that runs stages as one value; others among the values are left out."""
     given: dict[str, Any] = {
-        name: tuple(value or ()) if name in ("only", "assignments", "retry_reasons") else value
+        name: tuple(value or ()) if name in ("only", "assignments", "retry_reasons", "slurm") else value
         for name, value in values.items()
     }
     options = RunOptions(**{name: given[name] for name in _OF_RUN if name in given})

@@ -6,12 +6,12 @@ from pathlib import Path
 
 from pipelines.artifacts.codec_servers import require_gpus
 from pipelines.operations.dry_run import show_run
+from pipelines.operations.engine import engine_of
 from pipelines.operations.run_stage import print_result
 from pipelines.operations.runs.in_order import run_in_order
 from pipelines.recipe import Recipe, load_recipe, stage_config
 from pipelines.registry import load_stage
 from pipelines.running.conflict import conflict, fingerprint
-from pipelines.running.engines.choice import engine
 from pipelines.running.options import StageRequest
 from pipelines.running.settings import merge, parse_assignments
 from wsm_data.codecs.registry import CodecConfig, describe_codec
@@ -38,7 +38,7 @@ def run_recipe(recipe: str, request: StageRequest, on_finished: Callable[[str], 
     if options.limit or options.only:  # it narrows the first stage; the release says that it is partial
         packing = merge({"partial": True}, loaded.settings.get("pack", {}))
         loaded = replace(loaded, settings={**loaded.settings, "pack": packing})
-    run_engine = engine(request.engine)
+    run_engine = engine_of(request)
     out, configs = _choose_folder(loaded, request.out or Path("run"), options.fork)
     _require_gpus(configs, options.gpus)
     first = replace(options, fork=False)
@@ -46,7 +46,8 @@ def run_recipe(recipe: str, request: StageRequest, on_finished: Callable[[str], 
     if options.dry_run:
         show_run(configs, out, first, others)
         return
-    run_in_order(configs, out, lambda name: first if name == next(iter(configs)) else others, run_engine, on_finished)
+    with run_engine as opened:
+        run_in_order(configs, out, lambda name: first if name == next(iter(configs)) else others, opened, on_finished)
     for name in configs:
         print_result(name, out / name)
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import typer
 
 from pipelines.operations.dry_run import show_stage
+from pipelines.operations.engine import engine_of
 from pipelines.recipe import stage_sections
 from pipelines.registry import load_stage
-from pipelines.running.engines.choice import engine
 from pipelines.running.logs import log_table
 from pipelines.running.options import StageRequest
 from pipelines.running.runner import run_stage
@@ -67,7 +67,8 @@ def run_built(stage: Stage[ConfigT], config: ConfigT, out: Path, request: StageR
     if request.options.dry_run:
         show_stage(stage, config, out, request.options)
         return out
-    report = run_stage(stage, config, out, request.options, engine(request.engine))
+    with engine_of(request) as run_engine:
+        report = run_stage(stage, config, out, request.options, run_engine)
     table = summary_table([report])
     typer.echo(table)
     log_table(table)

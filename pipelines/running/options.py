@@ -57,6 +57,7 @@ class StageRequest:
         config: TOML file of differences, with a section per stage.
         assignments: `key=value` words of `--set`.
         engine: who runs the workers.
+        slurm: `key=value` words of `--slurm`: what is asked of Slurm.
         log_file: file to which a line a unit, warnings, tables and errors are added; None for none.
         options: what to run now.
     """
@@ -65,6 +66,7 @@ class StageRequest:
     config: Path | None = None
     assignments: tuple[str, ...] = ()
     engine: EngineName = EngineName.LOCAL
+    slurm: tuple[str, ...] = ()
     log_file: Path | None = None
     options: RunOptions = field(default_factory=lambda: RunOptions(workers=0))
 

@@ -206,7 +206,7 @@ def _work(job: _Job[ConfigT], selected: Sequence[Unit]) -> None:
     with (
         _serving(job, selected) as server,
         progress(job.stage.name, len(selected), job.options) as tell,
-        _reclaiming(job, again) as reclaim,
+        _reclaiming(job, frozenset(again)) as reclaim,
         _appender(job) as append,
         closing(
             job.engine(
@@ -217,6 +217,9 @@ def _work(job: _Job[ConfigT], selected: Sequence[Unit]) -> None:
         ) as outcomes,  # no worker outlives the lock
     ):
         for outcome in outcomes:
+            if outcome.unit not in again:  # its task was lost with a machine, and has been done once more
+                continue
+            again.discard(outcome.unit)
             job.ledger[outcome.unit] = append(LedgerEntry(key=job.keys[outcome.unit], outcome=outcome))
             count = with_outcome(count, outcome)
             tell(outcome)

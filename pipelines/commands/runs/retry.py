@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 from pipelines.commands.command import Command
-from pipelines.commands.options import Engine, LogFile, MaxRefused, Quiet, Verbose, Workers
+from pipelines.commands.options import Engine, LogFile, MaxRefused, Quiet, Slurm, Verbose, Workers
 from pipelines.commands.runs.options import Run
 from pipelines.commands.stage_options import REQUEST, stage_request
 
@@ -15,6 +15,7 @@ def retry(
     reason: Annotated[list[str], typer.Option("--reason", help="Reason code, as frame.undecodable. Repeatable.")],
     workers: Workers = REQUEST.options.workers,
     engine: Engine = REQUEST.engine,
+    slurm: Slurm = None,
     max_refused: MaxRefused = REQUEST.options.max_refused,
     quiet: Quiet = REQUEST.options.quiet,
     verbose: Verbose = REQUEST.options.verbose,
@@ -24,7 +25,7 @@ def retry(
     from pipelines.operations.runs.retry import retry as work
     from pipelines.running.logs import logged
 
-    values = {"workers": workers, "engine": engine, "max_refused": max_refused, "quiet": quiet}
+    values = {"workers": workers, "engine": engine, "slurm": slurm, "max_refused": max_refused, "quiet": quiet}
     request = stage_request({**values, "verbose": verbose, "log_file": log_file})
     with logged(request):
         work(run.absolute(), reason, request)

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from pipelines.operations.engine import engine_of
 from pipelines.operations.runs.in_order import run_in_order
 from pipelines.registry import STAGES, load_stage
 from pipelines.running.conflict import conflict
-from pipelines.running.engines.choice import engine
 from pipelines.running.options import StageRequest
 from pipelines.running.quarantine import QUARANTINE_FILE, read_quarantine
 from pipelines.running.stage_status import read_stage_folders
@@ -35,7 +35,8 @@ def retry(run: Path, reasons: Sequence[str], request: StageRequest) -> None:
     if changed:
         raise ConfigError("\n".join(changed))
     options = replace(request.options, retry_reasons=tuple(reasons))
-    run_in_order(configs, run, lambda _: options, engine(request.engine))
+    with engine_of(request) as run_engine:
+        run_in_order(configs, run, lambda _: options, run_engine)
 
 
 def _require_refused(run: Path, names: Sequence[str], reasons: Sequence[str]) -> None:

@@ -3,15 +3,21 @@
 import importlib.util
 import shutil
 from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import contextmanager
 from enum import StrEnum
+from functools import partial
 from typing import Protocol
 
+from pipelines.running.engines.slurm_config import SlurmConfig
 from pipelines.running.engines.task import ResultT, TaskT
 from wsm_data.errors import ConfigError
 
 
 class Engine(Protocol):
-    """Who runs the tasks. An engine knows no stage and writes no file; whoever consumes it writes the ledger."""
+    """Who runs the tasks. An engine knows no stage and writes no file; whoever consumes it writes the ledger.
+
+    A task that was lost with the machine it was on may be done again: its results then come again, all or some.
+    """
 
     def __call__(
         self, tasks: Sequence[TaskT], work: Callable[[TaskT], Iterator[ResultT]], workers: int, /
@@ -27,30 +33,40 @@ class EngineName(StrEnum):
     SLURM = "slurm"
 
 
-def engine(name: str) -> Engine:
-    """The engine of a name.
+@contextmanager
+def opened(name: str, slurm: SlurmConfig | None = None) -> Iterator[Engine]:
+    """The engine of a name, for all stages of a run.
+
+    Args:
+        name: the engine.
+        slurm: what is asked of Slurm.
 
     Raises:
-        ConfigError: there is no such engine, its extra is not installed, or it cannot work on this machine.
+        ConfigError: there is no such engine, its extra is not installed, it cannot work on this machine, or Slurm is
+            asked for something and is not the engine.
     """
+    if slurm is not None and name != EngineName.SLURM:
+        raise ConfigError(f"--slurm is for --engine slurm, found {name}; leave it out")
     match name:
         case EngineName.LOCAL:
             from pipelines.running.engines.local import run_local
 
-            return run_local
+            yield run_local
         case EngineName.RAY:
             _require_extra("ray", "ray")
-            from pipelines.running.engines.ray import run_ray
+            from pipelines.running.engines.ray import ray_session, run_ray
 
-            return run_ray
+            with ray_session():
+                yield run_ray
         case EngineName.SLURM:
             _require_extra("slurm", "submitit")
             if shutil.which("sbatch") is None:
                 raise ConfigError("--engine slurm submits with sbatch, which is not here; run it on a login node")
             from pipelines.running.engines.slurm import run_slurm
 
-            return run_slurm
-    raise ConfigError(f"there is no engine {name!r}; engines: {', '.join(EngineName)}")
+            yield partial(run_slurm, config=slurm or SlurmConfig())
+        case _:
+            raise ConfigError(f"there is no engine {name!r}; engines: {', '.join(EngineName)}")
 
 
 def _require_extra(extra: str, package: str) -> None:

@@ -1,63 +1,102 @@
-"""Batches of work as one array job on Slurm; knows no stage. Tested with submitit's local executor only."""
+"""Batches of work as array jobs on Slurm, a job a task; knows no stage."""
 
+import logging
 from collections.abc import Callable, Generator, Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
 import submitit
 
+from pipelines.running.engines.slurm_config import SlurmConfig
 from pipelines.running.engines.task import ResultT, TaskFailed, TaskT, limit_threads, results_of, unless_failed
 from wsm_data.errors import WsmError
 
 JOBS_FOLDER = Path("slurm-jobs")
 """Scripts, logs and results of the jobs, below the current folder, which every node must see; safe to delete."""
 
-_TIME_LIMIT_MIN = 24 * 60
+_LOG = logging.getLogger(__name__)
 _POLL_S = 1.0
 
 
 def run_slurm(
-    tasks: Sequence[TaskT], work: Callable[[TaskT], Iterator[ResultT]], workers: int, cluster: str = "slurm"
+    tasks: Sequence[TaskT],
+    work: Callable[[TaskT], Iterator[ResultT]],
+    workers: int,
+    cluster: str = "slurm",
+    config: SlurmConfig | None = None,
 ) -> Generator[ResultT, None, None]:
-    """Apply `work` to every task in `workers` jobs of one array, each with every `workers`-th task.
+    """Apply `work` to every task in an array of jobs, of which `workers` run at the same time.
 
-    Results come back when a job ends: the progress bar moves in steps, and of a job that is killed nothing is known,
-    so its tasks are done again by the next run. Partition, account, memory and a time limit other than 24 hours
-    are taken by sbatch from its own variables (SBATCH_PARTITION, SBATCH_ACCOUNT, SBATCH_MEM_PER_CPU,
-    SBATCH_TIMELIMIT, ...). Every node must see the same folders under the same paths. When a job fails the others
-    are waited for, so that what they did is kept; the failure is raised after that.
+    Results come back as each job ends. Of a job that was killed, timed out or lost with its node nothing is known: its
+    tasks are submitted again, each in a job of its own, once the others have ended. A task that raises is not; the
+    others are waited for, so that what they did is kept, and its error is raised after that. Every node must see the
+    same folders under the same paths. What `config` leaves open is taken by sbatch from its own variables
+    (SBATCH_PARTITION, SBATCH_ACCOUNT, ...).
 
     Args:
         tasks: must pickle, as must `work` and its results.
         work: generator function of one task.
-        workers: number of jobs; each takes one CPU.
-        cluster: `slurm`, or `local` for submitit's stand-in on this machine.
+        workers: jobs at work at once.
+        cluster: `slurm`, or `local` for submitit's stand-in on this machine, which runs as many as are submitted.
+        config: what each job asks for, and how often a task is submitted.
 
     Raises:
-        WsmError: a task raised one, or a job was killed.
+        WsmError: a task raised one, or its job was lost in every attempt.
         RuntimeError: a task raised anything else; the message is its traceback.
     """
-    if not tasks:
-        return
-    executor = submitit.AutoExecutor(folder=JOBS_FOLDER, cluster=cluster)
-    executor.update_parameters(name="wsm", cpus_per_task=1, timeout_min=_TIME_LIMIT_MIN)
-    shares = [tasks[first::workers] for first in range(min(workers, len(tasks)))]
-    jobs = executor.map_array(partial(_work_on, work), shares)
+    config = config or SlurmConfig()
+    lost = _shares(tasks, config.max_jobs)
     failures: list[TaskFailed] = []
+    for attempt in range(1, config.attempts + 1):
+        if not lost:
+            break
+        if attempt > 1:
+            _LOG.warning("%d jobs were lost; their tasks are submitted again, attempt %d", len(lost), attempt)
+            lost = _shares([task for share in lost for task in share], config.max_jobs)
+        lost = yield from _submitted(lost, work, workers, cluster, config, failures)
+    if lost:
+        count = sum(map(len, lost))
+        message = f"the jobs of {count} tasks gave no result in {config.attempts} attempts; logs are in {JOBS_FOLDER}"
+        failures.append(TaskFailed(WsmError(f"{message}. Run the same command again"), ""))
+    for failure in failures:
+        unless_failed(failure)
+
+
+def _shares(tasks: Sequence[TaskT], jobs: int) -> list[Sequence[TaskT]]:
+    """The tasks for at most so many jobs: one each, where that is enough."""
+    return [tasks[first::jobs] for first in range(min(jobs, len(tasks)))]
+
+
+def _submitted(
+    shares: Sequence[Sequence[TaskT]],
+    work: Callable[[TaskT], Iterator[ResultT]],
+    workers: int,
+    cluster: str,
+    config: SlurmConfig,
+    failures: list[TaskFailed],
+) -> Generator[ResultT, None, list[Sequence[TaskT]]]:
+    """Yield the results of one array of jobs; returns the shares of those that gave none."""
+    executor = submitit.AutoExecutor(folder=JOBS_FOLDER, cluster=cluster)
+    executor.update_parameters(name="wsm", cpus_per_task=config.cpus, timeout_min=config.time_min)
+    executor.update_parameters(slurm_array_parallelism=workers, **config.parameters())
+    jobs = executor.map_array(partial(_work_on, work), shares)
+    share_of = {job.job_id: share for job, share in zip(jobs, shares, strict=True)}
+    lost: list[Sequence[TaskT]] = []
     try:
         for job in submitit.helpers.as_completed(jobs, poll_frequency=_POLL_S):
-            results: Sequence[ResultT | TaskFailed] = _results(job)
-            for result in results:
+            results: Sequence[ResultT | TaskFailed] | None = _results(job)
+            if results is None:
+                lost.append(share_of[job.job_id])
+            for result in results or ():
                 if isinstance(result, TaskFailed):
                     failures.append(result)
                 else:
                     yield result
-        for failure in failures:
-            unless_failed(failure)
     finally:
         for job in jobs:
             if not job.done():
                 job.cancel()
+    return lost
 
 
 def _work_on(work: Callable[[TaskT], Iterator[ResultT]], tasks: Sequence[TaskT]) -> list[ResultT | TaskFailed]:
@@ -71,10 +110,11 @@ def _work_on(work: Callable[[TaskT], Iterator[ResultT]], tasks: Sequence[TaskT])
     return results
 
 
-def _results(job: "submitit.Job[Sequence[ResultT | TaskFailed]]") -> Sequence[ResultT | TaskFailed]:
+def _results(job: "submitit.Job[Sequence[ResultT | TaskFailed]]") -> Sequence[ResultT | TaskFailed] | None:
+    """What a job gave; None where it was lost."""
     try:
         results: Sequence[ResultT | TaskFailed] = job.result()
         return results
     except (submitit.core.utils.UncompletedJobError, submitit.core.utils.FailedJobError) as error:
-        message = f"job {job.job_id} gave no result ({error}); logs are in {JOBS_FOLDER}. Run the same command again"
-        return [TaskFailed(WsmError(message), "")]
+        _LOG.warning("job %s gave no result (%s)", job.job_id, str(error).strip().partition("\n")[0])
+        return None

@@ -52,6 +52,22 @@ def die(_: object) -> Iterator[int]:
     os._exit(9)
 
 
+def die_at_one(task: int) -> Iterator[int]:
+    yield task
+    if task == 1:
+        os._exit(9)
+
+
+def die_once(mark: str) -> Iterator[tuple[str, int]]:
+    """Two results; the process dies between them the first time."""
+    yield mark, 0
+    if not Path(mark).exists():
+        Path(mark).touch()
+        time.sleep(0.2)  # what was given has left the process
+        os._exit(9)
+    yield mark, 1
+
+
 def fail_to_pickle(_: object) -> Iterator[object]:
     yield lambda: None
 

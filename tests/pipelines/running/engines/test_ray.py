@@ -7,7 +7,7 @@ import fake_tasks
 import pytest
 import ray
 from fake_stages import COPY, CopyConfig
-from fake_tasks import die, fail, numbers_below, process_id, refuse
+from fake_tasks import die, die_once, fail, numbers_below, process_id, refuse
 
 from pipelines.running.engines.ray import run_ray
 from pipelines.running.options import RunOptions
@@ -45,9 +45,14 @@ def test_a_bug_arrives_with_its_traceback():
         list(run_ray([1, 2], fail, 2))
 
 
-def test_a_worker_that_dies_is_told():
-    with pytest.raises(WsmError, match="ray lost a worker"):
-        list(run_ray([1, 2], die, 2))
+def test_a_task_that_kills_its_worker_each_time_is_told():
+    with pytest.raises(WsmError, match="ray lost the worker of one task 3 times"):
+        list(run_ray([1], die, 1))
+
+
+def test_a_task_that_was_lost_with_its_worker_is_done_by_another(tmp_path):
+    found = list(run_ray([str(tmp_path / "a"), str(tmp_path / "b")], die_once, 2))
+    assert set(found) == {(str(tmp_path / name), number) for name in "ab" for number in range(2)}
 
 
 def test_a_stage_writes_the_same_bytes_as_with_local_processes(source, tmp_path):

@@ -6,9 +6,10 @@ from functools import partial
 
 import pytest
 from fake_stages import COPY, CopyConfig
-from fake_tasks import die, fail_but_two, numbers_below, process_id, refuse
+from fake_tasks import die_at_one, die_once, fail_but_two, numbers_below, process_id, refuse
 
 from pipelines.running.engines.slurm import run_slurm
+from pipelines.running.engines.slurm_config import SlurmConfig
 from pipelines.running.ledger import read_ledger
 from pipelines.running.options import RunOptions
 from pipelines.running.runner import run_stage
@@ -22,14 +23,14 @@ def run_here(tmp_path, monkeypatch, fakes_on_path):
     return partial(run_slurm, cluster="local")
 
 
-def test_every_result_arrives_once_from_as_many_jobs_as_workers(run_here, tmp_path):
-    expected = sorted((task, number) for task in range(5) for number in range(task))
-    assert sorted(run_here(list(range(5)), numbers_below, 2)) == expected
-    assert len(list((tmp_path / "slurm-jobs").glob("*_submitted.pkl"))) == 2
+def test_every_result_arrives_once_from_a_job_a_task(run_here, tmp_path):
+    expected = sorted((task, number) for task in range(4) for number in range(task))
+    assert sorted(run_here(list(range(4)), numbers_below, 2)) == expected
+    assert len(list((tmp_path / "slurm-jobs").glob("*_submitted.pkl"))) == 4
 
 
-def test_jobs_are_other_processes(run_here):
-    ids = list(run_here([0, 1, 2], process_id, 2))
+def test_tasks_beyond_the_jobs_of_an_array_share_them(run_here):
+    ids = list(run_here([0, 1, 2], process_id, 2, config=SlurmConfig(max_jobs=2)))
     assert len(ids) == 3
     assert len(set(ids)) == 2
     assert os.getpid() not in ids
@@ -58,10 +59,22 @@ def collect(generator, results):
     return ()
 
 
-def test_a_job_that_dies_is_told_with_its_log(run_here, monkeypatch):
+@pytest.fixture
+def no_wait(monkeypatch):
     monkeypatch.setattr("submitit.core.core.Job._results_timeout_s", 0)  # a cluster's file system may be 15 s late
-    with pytest.raises(WsmError, match=r"(?s)job \d+ gave no result .*logs are in slurm-jobs"):
-        list(run_here([1], die, 1))
+
+
+def test_a_job_that_dies_each_time_is_told_after_what_the_others_did(run_here, no_wait):
+    results = []
+    with pytest.raises(WsmError, match=r"(?s)jobs of 1 tasks gave no result in 2 attempts; logs are in slurm-jobs"):
+        collect(run_here([0, 1], die_at_one, 2, config=SlurmConfig(attempts=2)), results)
+    assert results == [0]
+
+
+def test_what_a_lost_job_had_to_do_is_submitted_again_and_nothing_else(run_here, no_wait, tmp_path):
+    found = list(run_here([str(tmp_path / "a"), str(tmp_path / "b")], die_once, 2))
+    assert set(found) == {(str(tmp_path / name), number) for name in "ab" for number in range(2)}
+    assert len(list((tmp_path / "slurm-jobs").glob("*_submitted.pkl"))) == 4
 
 
 def test_a_stage_writes_the_same_bytes_as_with_local_processes(run_here, source, tmp_path):
