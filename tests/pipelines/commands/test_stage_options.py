@@ -15,6 +15,7 @@ from pipelines.running.engines.choice import EngineName
 from pipelines.running.options import RunOptions, StageRequest
 
 ASKED = {
+    "--slurm partition=gpu --slurm time_min=5": {"slurm": ("partition=gpu", "time_min=5")},
     "-o there": {"out": Path("there")},
     "--config my.toml": {"config": Path("my.toml")},
     "-s a=1 --set b.c=2": {"assignments": ("a=1", "b.c=2")},
@@ -33,7 +34,7 @@ ASKED = {
     "-v": {"verbose": True},
     "--log-file /dev/null": {"log_file": Path("/dev/null")},
 }
-REQUESTED = ("out", "config", "assignments", "engine", "log_file")
+REQUESTED = ("out", "config", "assignments", "engine", "slurm", "log_file")
 
 
 def request(**changes):

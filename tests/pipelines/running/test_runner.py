@@ -398,17 +398,3 @@ def test_a_stage_that_gives_a_unit_twice_is_a_bug(config, out):
     (config.source / "a2.txt").write_text("given twice")
     with pytest.raises(RuntimeError, match="copy gave an outcome too many, for a2"):
         run_stage(COPY, config, out, ANY)
-
-
-def test_outcomes_that_come_again_after_a_loss_are_written_down_once(source, tmp_path):
-    """Each unit is given twice, as by a task that was lost after its first outcome."""
-
-    def twice(tasks, work, _workers):
-        for task in tasks:
-            yield from work(task)
-            yield from work(task)
-
-    options = RunOptions(quiet=True, max_refused=5, workers=2)
-    report = run_stage(COPY, CopyConfig(source=source), tmp_path / "out", options, twice)
-    assert (report.done, len(report.ran)) == (3, 3)
-    assert len((tmp_path / "out" / "ledger.jsonl").read_text().splitlines()) == 3

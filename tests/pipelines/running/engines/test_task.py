@@ -1,9 +1,12 @@
 """What crosses from a worker to its parent."""
 
 import pytest
+from fake_runs import ANY
+from fake_stages import COPY, CopyConfig
 from fake_tasks import fail, refuse
 
 from pipelines.running.engines.task import TaskFailed, results_of, unless_failed
+from pipelines.running.runner import run_stage
 from wsm_data.errors import DataError
 
 
@@ -30,3 +33,17 @@ def test_ctrl_c_is_no_failure_of_a_task():
 
     with pytest.raises(KeyboardInterrupt):
         list(results_of(interrupted, 1))
+
+
+def test_outcomes_that_come_again_after_a_loss_are_written_down_once(source, tmp_path):
+    """Each unit is given twice, as by a task that was lost after its first outcome."""
+
+    def twice(tasks, work, _workers):
+        for task in tasks:
+            yield from work(task)
+            yield from work(task)
+
+    options = ANY
+    report = run_stage(COPY, CopyConfig(source=source), tmp_path / "out", options, twice)
+    assert (report.done, len(report.ran)) == (3, 3)
+    assert len((tmp_path / "out" / "ledger.jsonl").read_text().splitlines()) == 3
