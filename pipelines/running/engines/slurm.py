@@ -1,6 +1,8 @@
 """Batches of work as array jobs on Slurm, a job a task; knows no stage."""
 
 import logging
+import subprocess
+import time
 from collections.abc import Callable, Generator, Iterator, Sequence
 from functools import partial
 from pathlib import Path
@@ -16,6 +18,8 @@ JOBS_FOLDER = Path("slurm-jobs")
 
 _LOG = logging.getLogger(__name__)
 _POLL_S = 1.0
+_LATE_S = 15.0
+"""For so long the file system of a cluster may keep a result that a job has written to itself, s."""
 
 
 def run_slurm(
@@ -82,8 +86,10 @@ def _submitted(
     jobs = executor.map_array(partial(_work_on, work), shares)
     share_of = {job.job_id: share for job, share in zip(jobs, shares, strict=True)}
     lost: list[Sequence[TaskT]] = []
+    waiting = dict.fromkeys(jobs)
     try:
-        for job in submitit.helpers.as_completed(jobs, poll_frequency=_POLL_S):
+        for job in _as_they_end(jobs, cluster):
+            del waiting[job]
             results: Sequence[ResultT | TaskFailed] | None = _results(job)
             if results is None:
                 lost.append(share_of[job.job_id])
@@ -93,10 +99,39 @@ def _submitted(
                 else:
                     yield result
     finally:
-        for job in jobs:
-            if not job.done():
-                job.cancel()
+        for job in waiting:
+            job.cancel(check=False)
     return lost
+
+
+def _as_they_end(jobs: "Sequence[submitit.Job[object]]", cluster: str) -> "Iterator[submitit.Job[object]]":
+    """Jobs as they give a result, or are gone from the queue without one.
+
+    submitit asks sacct, which sites without accounting do not have: there a job that was killed is at work for ever.
+    """
+    waiting = list(jobs)
+    gone_since: dict[str, float] = {}
+    while waiting:
+        queued = _queued() if cluster == "slurm" else {job.job_id for job in waiting if not job.done()}
+        now = time.monotonic()
+        for job in tuple(waiting):
+            is_gone = queued is not None and job.job_id not in queued
+            since = gone_since.setdefault(job.job_id, now) if is_gone else now
+            if job.paths.result_pickle.exists() or (is_gone and now - since >= _LATE_S):
+                waiting.remove(job)
+                yield job
+        if waiting:
+            time.sleep(_POLL_S)
+
+
+def _queued() -> set[str] | None:
+    """Ids of the user's jobs that wait or run; None where nobody says."""
+    command = ["squeue", "--me", "--noheader", "--array", "--format=%i"]
+    asked = subprocess.run(command, capture_output=True, text=True, check=False)
+    if asked.returncode:
+        _LOG.warning("squeue does not say which jobs are left (%s); it is asked again", asked.stderr.strip())
+        return None
+    return set(asked.stdout.split())
 
 
 def _work_on(work: Callable[[TaskT], Iterator[ResultT]], tasks: Sequence[TaskT]) -> list[ResultT | TaskFailed]:
@@ -112,9 +147,12 @@ def _work_on(work: Callable[[TaskT], Iterator[ResultT]], tasks: Sequence[TaskT])
 
 def _results(job: "submitit.Job[Sequence[ResultT | TaskFailed]]") -> Sequence[ResultT | TaskFailed] | None:
     """What a job gave; None where it was lost."""
-    try:
-        results: Sequence[ResultT | TaskFailed] = job.result()
-        return results
-    except (submitit.core.utils.UncompletedJobError, submitit.core.utils.FailedJobError) as error:
-        _LOG.warning("job %s gave no result (%s)", job.job_id, str(error).strip().partition("\n")[0])
-        return None
+    if job.paths.result_pickle.exists():
+        try:
+            results: Sequence[ResultT | TaskFailed] = job.result()
+            return results
+        except submitit.core.utils.FailedJobError as error:
+            _LOG.warning("job %s failed: %s", job.job_id, error)
+            return None
+    _LOG.warning("job %s ended without a result; its log is in %s", job.job_id, JOBS_FOLDER)
+    return None

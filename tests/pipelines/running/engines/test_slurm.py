@@ -1,13 +1,16 @@
 """The Slurm engine, through submitit's stand-in for a cluster on this machine."""
 
 import os
+import subprocess
 from dataclasses import replace
 from functools import partial
+from types import SimpleNamespace
 
 import pytest
 from fake_stages import COPY, CopyConfig
 from fake_tasks import die_at_one, die_once, fail_but_two, numbers_below, process_id, refuse
 
+from pipelines.running.engines import slurm
 from pipelines.running.engines.slurm import run_slurm
 from pipelines.running.engines.slurm_config import SlurmConfig
 from pipelines.running.ledger import read_ledger
@@ -61,7 +64,7 @@ def collect(generator, results):
 
 @pytest.fixture
 def no_wait(monkeypatch):
-    monkeypatch.setattr("submitit.core.core.Job._results_timeout_s", 0)  # a cluster's file system may be 15 s late
+    monkeypatch.setattr(slurm, "_LATE_S", 0.0)  # a cluster's file system may be late, this machine's is not
 
 
 def test_a_job_that_dies_each_time_is_told_after_what_the_others_did(run_here, no_wait):
@@ -88,3 +91,26 @@ def test_a_stage_writes_the_same_bytes_as_with_local_processes(run_here, source,
     assert {unit: replace(entry.outcome, seconds=0, facts={}) for unit, entry in read_ledger(slurm).items()} == {
         unit: replace(entry.outcome, seconds=0, facts={}) for unit, entry in read_ledger(local).items()
     }
+
+
+def test_a_job_that_is_gone_from_the_queue_is_lost_also_where_there_is_no_accounting(monkeypatch, no_wait, tmp_path):
+    """Two jobs of Slurm: one is at work until it has a result, the other was cancelled."""
+    monkeypatch.setattr(slurm, "_POLL_S", 0.0)
+    jobs = [
+        SimpleNamespace(job_id=f"7_{one}", paths=SimpleNamespace(result_pickle=tmp_path / str(one))) for one in "ab"
+    ]
+    answers = [subprocess.CompletedProcess([], 1, "", "no answer"), *(done("7_a") for _ in range(2)), done("")]
+
+    def asked(command, **_):
+        assert command[0] == "squeue"
+        if len(answers) == 2:
+            (tmp_path / "a").touch()
+        return answers.pop(0)
+
+    monkeypatch.setattr(subprocess, "run", asked)
+    assert [job.job_id for job in slurm._as_they_end(jobs, "slurm")] == ["7_b", "7_a"]
+    assert len(answers) == 1
+
+
+def done(said):
+    return subprocess.CompletedProcess([], 0, said, "")
