@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parent / "fakes"))
 sys.path.insert(0, str(Path(__file__).parents[1] / "pipelines" / "fakes"))
 sys.path.insert(0, str(Path(__file__).parents[1] / "wsm_data" / "fakes"))
 
