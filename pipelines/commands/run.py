@@ -41,11 +41,14 @@ def status(
     run: Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run, or of one stage.")],
     as_json: Annotated[bool, typer.Option("--json", help="Print one line of JSON in place of the table.")] = False,
     watch: Annotated[bool, typer.Option("--watch", help="Print it again every two seconds, until Ctrl-C.")] = False,
+    prometheus: Annotated[
+        Path | None, typer.Option("--prometheus", help="File for a node's exporter, replaced each time.")
+    ] = None,
 ) -> None:
     """Show where a run stands, while it runs or afterwards."""
     from pipelines.operations.status import show_status
 
-    show_status(run, as_json, watch)
+    show_status(run, as_json, watch, prometheus)
 
 
 def _run(recipe: str, request: StageRequest) -> None:

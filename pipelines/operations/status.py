@@ -7,10 +7,12 @@ from pathlib import Path
 
 import typer
 
+from pipelines.operations.prometheus import prometheus_text
 from pipelines.registry import STAGES
 from pipelines.running.lock_holder import held_locks
 from pipelines.running.stage_status import StageStatus, read_stage_folders, stage_status
 from wsm_data.errors import ConfigError
+from wsm_data.files.atomic import write_text
 from wsm_data.files.json_values import to_json
 from wsm_data.files.jsonlines import canonical_json
 from wsm_data.view.drawing.text_table import aligned
@@ -34,8 +36,10 @@ class RunStatus:
     stages: tuple[StageStatus, ...]
 
 
-def show_status(run: Path, as_json: bool, watch: bool) -> None:
+def show_status(run: Path, as_json: bool, watch: bool, prometheus: Path | None = None) -> None:
     """Print where a run, or one stage, stands; with `watch` again every two seconds, until it is interrupted.
+
+    Each time the file `prometheus` is replaced by the same numbers for Prometheus.
 
     Raises:
         ConfigError: the folder is of no run.
@@ -44,6 +48,8 @@ def show_status(run: Path, as_json: bool, watch: bool) -> None:
     while True:
         status = run_status(run)
         typer.echo(canonical_json(to_json(status)) if as_json else status_text(status))
+        if prometheus is not None:
+            write_text(prometheus, prometheus_text(str(run), status.stages))
         if not watch:
             return
         time.sleep(_WATCH_EVERY_S)
