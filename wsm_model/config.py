@@ -81,6 +81,9 @@ class ModelConfig:
         state_query_time: timestep that state queries are modulated with (paper silent).
         variant: the full model, or the ablation without SLAM.
         prediction: `velocity` (the paper), or `clean`, from which it follows (`wsm_model.flow.velocity_of`).
+        own_dream_attention: whether the generation expert asks, answers and gathers for the RGB it dreams with matrices
+            of their own, as after post-training: what was seen passes through those of pretraining, so that the SLAM
+            expert, which reads it, says what it said to the bit.
     """
 
     generation: ExpertConfig
@@ -105,6 +108,7 @@ class ModelConfig:
     state_query_time: float = 1000.0
     variant: Variant = Variant.SLAM
     prediction: Prediction = Prediction.VELOCITY
+    own_dream_attention: bool = False
 
     def __post_init__(self) -> None:
         if self.latent_height % self.patch or self.latent_width % self.patch:

@@ -53,6 +53,7 @@ _LATER_SETTINGS = {
     "training.rgb_noise": 0.0,
     "training.rgb_noise_probability": 0.5,
     "model.init": "",
+    "shape.own_dream_attention": False,
 }
 """Settings that change nothing at these values, and are no part of a run then: one that began without them goes on."""
 

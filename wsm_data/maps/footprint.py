@@ -1,7 +1,6 @@
 """The robot as a disc: where its centre may be, how near it comes to what is occupied, whether a path is free."""
 
 import math
-from itertools import pairwise
 
 import numpy as np
 from numba import njit
@@ -95,29 +94,65 @@ def _nearest_squares(cells: Uint8Array, positions: Float64Array) -> Float64Array
 
 
 def footprint_is_free(grid: OccupancyGrid, path_xy_m: Float64Array, radius_m: float) -> bool:
-    """Whether a disc can be driven along a path without touching what is occupied or leaving what is known.
+    """`footprints_are_free` of one path [T, 2]."""
+    return bool(footprints_are_free(grid, np.asarray(path_xy_m)[None], radius_m)[0])
+
+
+def footprints_are_free(grid: OccupancyGrid, paths_xy_m: Float64Array, radius_m: float) -> BoolArray:
+    """Whether a disc can be driven along paths without touching what is occupied or leaving what is known.
 
     The centre must be in FREE cells and its clearance at least the radius, at the positions and between them at
     steps of no more than half a cell (spec/model.md, section 8).
 
     Args:
         grid: the map.
-        path_xy_m: positions in the world, m; [T, 2].
+        paths_xy_m: positions in the world, m; [G, T, 2]. One that is not finite is not free.
         radius_m: radius of the disc, m.
+
+    Returns:
+        bool [G].
     """
-    dense = _densify(path_xy_m, grid.resolution_m / 2)
-    columns, rows = np.floor(grid.fractional_cells(dense) + 0.5).astype(np.int64).T
-    inside = (columns >= 0) & (columns < grid.cells.shape[1]) & (rows >= 0) & (rows < grid.cells.shape[0])
-    if not inside.all() or (grid.cells[rows, columns] != FREE).any():
+    positions = grid.fractional_cells(np.asarray(paths_xy_m, np.float64)) + 0.5
+    cells = np.ascontiguousarray(grid.cells)
+    return np.asarray(_ways_are_free(cells, np.ascontiguousarray(positions), grid.resolution_m, radius_m))
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _ways_are_free(cells: Uint8Array, positions: Float64Array, resolution_m: float, radius_m: float) -> BoolArray:
+    """The disc at (x, y) of paths [G, T, 2], in cells from the map's lower corner, and between them."""
+    free = np.ones(len(positions), np.bool_)
+    for path in range(len(positions)):
+        for number in range(positions.shape[1]):
+            x, y = positions[path, number, 0], positions[path, number, 1]
+            x0, y0 = positions[path, max(number - 1, 0), 0], positions[path, max(number - 1, 0), 1]
+            way = math.sqrt((x - x0) ** 2 + (y - y0) ** 2)
+            if not math.isfinite(way):
+                free[path] = False
+                break
+            steps = max(1, math.ceil(2 * way))
+            for step in range(1, steps + 1):
+                share = step / steps
+                if not _disc_is_free(cells, x0 + (x - x0) * share, y0 + (y - y0) * share, resolution_m, radius_m):
+                    free[path] = False
+                    break
+            if not free[path]:
+                break
+    return free
+
+
+@njit(cache=True)  # type: ignore[untyped-decorator]
+def _disc_is_free(cells: Uint8Array, x: float, y: float, resolution_m: float, radius_m: float) -> bool:
+    """Whether the centre is in a FREE cell, and no OCCUPIED square is nearer to it than the radius."""
+    rows, columns = cells.shape
+    column0, row0 = math.floor(x), math.floor(y)
+    if not (0 <= column0 < columns and 0 <= row0 < rows) or cells[row0, column0] != FREE:
         return False
-    return bool((clearance_m(grid, dense) >= radius_m).all())
-
-
-def _densify(path_xy_m: Float64Array, step_m: float) -> Float64Array:
-    """The positions of a path [T, 2] and evenly spaced ones between them, no more than `step_m` apart; [N, 2]."""
-    path = np.asarray(path_xy_m, np.float64)
-    parts = [path[:1]]
-    for start, end in pairwise(path):
-        steps = max(1, math.ceil(float(np.linalg.norm(end - start)) / step_m))
-        parts.append(start + (end - start) * (np.arange(1, steps + 1) / steps)[:, None])
-    return np.concatenate(parts)
+    reach = math.ceil(radius_m / resolution_m) + 1
+    for row in range(max(0, row0 - reach), min(rows, row0 + reach + 1)):
+        for column in range(max(0, column0 - reach), min(columns, column0 + reach + 1)):
+            if cells[row, column] == OCCUPIED:
+                dx = max(column - x, x - column - 1, 0.0)
+                dy = max(row - y, y - row - 1, 0.0)
+                if math.sqrt(dx * dx + dy * dy) * resolution_m < radius_m:
+                    return False
+    return True

@@ -40,6 +40,21 @@ def ate_sim3(estimated_m: Float64Array, true_m: Float64Array) -> AlignedError:
     return _aligned(estimated_m, true_m, with_scale=True)
 
 
+def sim3_residual_m(estimated_m: Float64Array, true_m: Float64Array) -> float:
+    """`ate_sim3(...).rmse_m` where the alignment is determined, and defined where it is not, as on a straight way.
+
+    What is left after the best similarity follows from singular values alone (Umeyama 1991, equation 33), also where
+    a turn about the line that all centres lie on changes nothing.
+    """
+    estimated, true = (np.asarray(one, np.float64) - np.mean(one, axis=0) for one in (estimated_m, true_m))
+    spread_true, spread = (float(np.square(one).sum(axis=1).mean()) for one in (true, estimated))
+    if not spread:
+        return float(np.sqrt(spread_true))
+    left, singular, right = np.linalg.svd(true.T @ estimated / len(true))
+    singular[-1] *= np.sign(np.linalg.det(left) * np.linalg.det(right))
+    return float(np.sqrt(max(0.0, spread_true - singular.sum() ** 2 / spread)))
+
+
 def ate_se3(estimated_m: Float64Array, true_m: Float64Array) -> AlignedError:
     """Absolute trajectory error of camera centres [T, 3] after rigid alignment.
 

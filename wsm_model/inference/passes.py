@@ -108,7 +108,11 @@ def query_states(
 
 
 def velocity(
-    model: MixtureOfTransformers, histories: Sequence[History], noisy: Tensor, flow_time: float, context: Tensor
+    model: MixtureOfTransformers,
+    histories: Sequence[History],
+    noisy: Tensor,
+    flow_time: float | Tensor,
+    context: Tensor,
 ) -> Tensor:
     """Velocity of the noisy RGB latents of the next chunk, [B, F, C, h, w], from all that is known before it.
 
@@ -116,19 +120,21 @@ def velocity(
         model: the model.
         histories: of each row.
         noisy: x_tau, [B, F, C, h, w].
-        flow_time: tau.
+        flow_time: tau, one for all or one a row [B].
         context: goal tokens [B, F, 1, D].
     """
     expert = model.expert(Expert.GENERATION)
     latents, firsts = noisy.unsqueeze(1), [history.rgb.next for history in histories]
-    stream = expert.stream(latents, _times(latents, flow_time * FLOW_TIME_SCALE), _numbers(latents, firsts), 0)
+    tau = torch.as_tensor(flow_time, dtype=torch.float32, device=noisy.device).expand(len(noisy))[:, None]
+    times = (tau * FLOW_TIME_SCALE)[:, None].expand(latents.shape[:3])
+    stream = expert.stream(latents, times, _numbers(latents, firsts), 0)
     sees_states = model.config.variant is Variant.SLAM
     reach = Reach(own=Side.RGB, sides=frozenset(Side) if sees_states else frozenset({Side.RGB}))
     done = model.run(
         {Expert.GENERATION: stream}, lambda layer, tokens: _gather(tokens, layer, histories, reach), context
     )
     read = expert.read(done[Expert.GENERATION]).float()
-    return velocity_of(model.config.prediction, read, noisy, torch.full(noisy.shape[:2], flow_time).to(noisy))
+    return velocity_of(model.config.prediction, read, noisy, tau.expand(noisy.shape[:2]))
 
 
 def _run_clean(

@@ -7,6 +7,8 @@ Shape suffixes: B batch, G copies of a frame, F latent frames, P tokens of a fra
 width of a head, S tokens of the context.
 """
 
+from collections.abc import Callable
+
 import torch
 from torch import Tensor, nn
 from torch.nn.functional import layer_norm, rms_norm, scaled_dot_product_attention
@@ -54,6 +56,11 @@ class Projections(nn.Module):
     def values(self, x: Tensor) -> Tensor:
         """Values [..., H, d] of tokens."""
         return self.to_v(x).unflatten(-1, (self.heads, -1))
+
+    def out(self, x: Tensor) -> Tensor:
+        """The way back: [..., H d] to [..., D]."""
+        found: Tensor = self.to_out(x)
+        return found
 
 
 class CrossAttention(Projections):
@@ -113,6 +120,8 @@ class ExpertBlock(nn.Module):
         widths = config.expert(expert)
         self.eps = config.norm_eps
         self.attention = Projections(widths.width, widths.width, config)
+        is_own = config.own_dream_attention and expert is Expert.GENERATION
+        self.dream_attention = Projections(widths.width, widths.width, config) if is_own else None
         self.table = nn.Parameter(torch.randn(MODULATIONS, widths.width) / widths.width**0.5)
         self.feed_forward = nn.Sequential(
             nn.Linear(widths.width, widths.feed_forward_width),
@@ -122,18 +131,22 @@ class ExpertBlock(nn.Module):
         across = OneTokenAttention if config.goal_tokens == 1 else CrossAttention
         self.cross_attention = across(widths.width, config) if sees_goal(config, expert) else None
 
-    def before_attention(self, x: Tensor, modulation: Tensor, rope: tuple[Tensor, Tensor]) -> QueriesKeysValues:
+    def before_attention(
+        self, x: Tensor, modulation: Tensor, rope: tuple[Tensor, Tensor], prediction: int | None
+    ) -> QueriesKeysValues:
         """Queries, keys and values of tokens.
 
         Args:
             x: [B, G, F, P, D].
             modulation: float32 [B, G, F, 1 or P, 6, D], without the layer's own table.
             rope: cosine and sine, float32, broadcastable to [B, G, F, P, d / 2].
+            prediction: which of the G copies are predictions; None where none are.
         """
         shift, scale, _ = self._modulation(modulation, 0)
         normed = modulated_norm(x, shift, scale, self.eps)
-        queries, keys = self.attention.queries(normed), self.attention.keys(normed)
-        values = self.attention.values(normed)
+        queries = self._project(normed, prediction, Projections.queries)
+        keys = self._project(normed, prediction, Projections.keys)
+        values = self._project(normed, prediction, Projections.values)
         return QueriesKeysValues(rotate(queries, rope).to(values.dtype), rotate(keys, rope).to(values.dtype), values)
 
     def after_attention(
@@ -152,7 +165,8 @@ class ExpertBlock(nn.Module):
             ValueError: predictions of this expert see the goal, and there is no context.
         """
         _, _, gate = self._modulation(modulation, 0)
-        x = gated_sum(x, self.attention.to_out(gathered.flatten(-2).to(x.dtype)), gate)
+        found = self._project(gathered.flatten(-2).to(x.dtype), prediction, Projections.out)
+        x = gated_sum(x, found, gate)
         if self.cross_attention is not None and prediction is not None:
             if context is None:
                 raise ValueError("predictions of this expert see the goal: give its tokens as context")
@@ -161,6 +175,18 @@ class ExpertBlock(nn.Module):
             x = torch.stack(copies, dim=1)
         shift, scale, gate = self._modulation(modulation, 3)
         return gated_sum(x, self.feed_forward(modulated_norm(x, shift, scale, self.eps)), gate)
+
+    def _project(self, x: Tensor, prediction: int | None, project: Callable[[Projections, Tensor], Tensor]) -> Tensor:
+        """Each copy by its own matrices: predictions by those of dreams, where the expert has such."""
+        if self.dream_attention is None or prediction is None:
+            return project(self.attention, x)
+        return torch.stack(
+            [
+                project(self.dream_attention if copy == prediction else self.attention, part)
+                for copy, part in enumerate(x.unbind(1))
+            ],
+            dim=1,
+        )
 
     def _modulation(self, modulation: Tensor, first: int) -> tuple[Tensor, Tensor, Tensor]:
         three = modulation[..., first : first + 3, :] + self.table[first : first + 3].float()

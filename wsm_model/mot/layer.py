@@ -44,7 +44,7 @@ class JointLayer(nn.Module):
         """
         blocks = {expert: cast(ExpertBlock, self.experts[expert.value]) for expert in streams}
         asked = {
-            expert: blocks[expert].before_attention(tokens[expert], stream.modulation, stream.rope)
+            expert: blocks[expert].before_attention(tokens[expert], stream.modulation, stream.rope, stream.prediction)
             for expert, stream in streams.items()
         }
         gathered = attend(self.number, asked)

@@ -29,9 +29,15 @@ def write_diffusers(folder: Path, model: WorldSlamModel) -> None:
     """Write weights and `config.json`, the latter last, in the dtypes that the model has.
 
     Raises:
-        ConfigError: the expert is not as wide as its attention, as every transformer of Wan2.2 is.
+        ConfigError: the expert is not as wide as its attention, as every transformer of Wan2.2 is; or it has matrices
+            of their own for dreams.
     """
     config = model.config
+    if config.own_dream_attention:
+        raise ConfigError(
+            "a post-trained model dreams with matrices of its own beside those that read what was seen, and a "
+            "transformer of diffusers has room for one set; export the model that it was post-trained from"
+        )
     if config.generation.width != config.attention_width:
         raise ConfigError(
             f"the RGB expert must be as wide as its attention to be one of Wan2.2's transformers, found widths of "

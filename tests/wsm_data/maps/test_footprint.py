@@ -1,3 +1,4 @@
+import itertools
 import math
 
 import numpy as np
@@ -5,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wsm_data.maps.footprint import clearance_m, footprint_is_free, traversable
+from wsm_data.maps.footprint import clearance_m, footprint_is_free, footprints_are_free, traversable
 from wsm_data.schema.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 
 RESOLUTION_M = 0.05
@@ -86,3 +87,32 @@ def test_a_footprint_is_not_free_where_the_map_is_unknown_or_ends(grid_of):
     assert footprint_is_free(grid, np.array([[0.02, 0.02], [0.08, 0.02]]), 0.01)
     assert not footprint_is_free(grid, np.array([[0.02, 0.02], [0.2, 0.02]]), 0.01)
     assert not footprint_is_free(grid, np.array([[0.2, 0.02], [0.3, 0.02]]), 0.01)
+
+
+def free_way(grid, path, radius_m):
+    """The slow way: positions no more than half a cell apart, each in a FREE cell and as far from what is occupied."""
+    dense = [path[:1]]
+    for start, end in itertools.pairwise(path):
+        steps = max(1, math.ceil(np.linalg.norm(end - start) / (grid.resolution_m / 2)))
+        dense.append(start + (end - start) * (np.arange(1, steps + 1) / steps)[:, None])
+    dense = np.concatenate(dense)
+    columns, rows = np.floor(grid.fractional_cells(dense) + 0.5).astype(int).T
+    if min(rows.min(), columns.min()) < 0 or rows.max() >= grid.cells.shape[0] or columns.max() >= grid.cells.shape[1]:
+        return False
+    return bool((grid.cells[rows, columns] == FREE).all() and (clearance_m(grid, dense) >= radius_m).all())
+
+
+@settings(max_examples=40, deadline=None)
+@given(seed=st.integers(0, 10_000))
+def test_ways_are_free_where_the_slow_way_says_so(seed):
+    rng = np.random.default_rng(seed)
+    grid = random_grid(seed, occupied_share=0.01)
+    low = np.array(grid.origin_cell) * RESOLUTION_M
+    paths = low + rng.uniform(0.1, 1.1, (6, 1, 2)) + np.cumsum(rng.normal(0, 0.06, (6, 5, 2)), axis=1)
+    found = footprints_are_free(grid, paths, 0.12)
+    assert found.tolist() == [free_way(grid, path, 0.12) for path in paths]
+
+
+def test_a_way_that_is_no_number_is_not_free(grid_of):
+    grid = grid_of("....")
+    assert not footprint_is_free(grid, np.array([[0.075, 0.025], [np.nan, 0.025]]), 0.0)

@@ -3,7 +3,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from wsm_data.errors import DataError, Reason
-from wsm_data.metrics.trajectory import ate_rmse_unaligned_m, ate_se3, ate_sim3
+from wsm_data.metrics.trajectory import ate_rmse_unaligned_m, ate_se3, ate_sim3, sim3_residual_m
 
 
 @pytest.fixture
@@ -44,3 +44,13 @@ def test_a_straight_drive_cannot_be_aligned_but_has_an_unaligned_error():
 def test_trajectories_of_two_lengths_are_a_mistake_of_the_caller(path_m):
     with pytest.raises(ValueError, match="both must be"):
         ate_rmse_unaligned_m(path_m[1:], path_m)
+
+
+def test_the_residual_is_that_of_the_alignment_and_defined_on_a_straight_way_too(path_m):
+    """Mirrored estimates too: a similarity does not mirror. To 1e-9 of paths of some metres."""
+    rng = np.random.default_rng(1)
+    for estimated in (path_m + 0.3 * rng.normal(size=path_m.shape), path_m * [1, 1, -1], 3 * path_m[::-1]):
+        assert sim3_residual_m(estimated, path_m) == pytest.approx(ate_sim3(estimated, path_m).rmse_m, abs=1e-9)
+    line = np.outer(np.arange(10.0), [1, 2, 0])
+    assert sim3_residual_m(5 * line, line) == pytest.approx(0, abs=1e-6)  # the root of what rounding leaves
+    assert sim3_residual_m(np.zeros((10, 3)), line) == pytest.approx(np.sqrt(np.mean(5 * (np.arange(10) - 4.5) ** 2)))
