@@ -14,9 +14,9 @@ from wsm_data.shards.selection import Selection, selection_names
 from wsm_data.view.browser.clip_page import clip_page, map_picture
 from wsm_data.view.browser.clip_query import ClipQuery
 from wsm_data.view.browser.clip_table import RANK, clip_table
-from wsm_data.view.browser.jpeg import jpeg, thumbnail
 from wsm_data.view.browser.kept import Kept
 from wsm_data.view.clip.pictures import decode_pictures
+from wsm_data.view.drawing.jpeg import jpeg, thumbnail
 
 _KEPT_CLIPS = 3
 _KEPT_THUMBNAILS = 3000

@@ -19,10 +19,10 @@ from wsm_data.schema.depth import DepthRange
 from wsm_data.schema.episode import EpisodeRecord
 from wsm_data.schema.frames import EpisodeFrames
 from wsm_data.schema.verdict import Refusal
-from wsm_data.view.browser.jpeg import jpeg, thumbnail
 from wsm_data.view.browser.kept import Kept
 from wsm_data.view.browser.named_image import decode_damaged, named_image
 from wsm_data.view.drawing.depth_colours import depth_picture
+from wsm_data.view.drawing.jpeg import jpeg, thumbnail
 
 _KEPT_CONTAINERS = 8
 _KEPT_EPISODES = 2

@@ -1,10 +1,11 @@
 """One clip as a recording for the viewer of rerun (https://rerun.io), to be looked at in three dimensions.
 
-Written for rerun-sdk 0.23 and later, and tested with 0.23.0 and 0.41.0. The package is optional, the extra `viz`, and
-is imported when a recording is written.
+Written for rerun-sdk 0.41, whose encoded depth images are declared unstable. The package is optional, the extra `viz`,
+and is imported when a recording is written.
 
 Entities: `world` holds the map on the floor, the expert's path, the goal region and the moving `camera`, below whose
-`pinhole` hang the decoded `rgb` and `depth`; `distance` holds the curves; `about` what `wsm inspect` prints.
+`pinhole` hang the decoded `rgb` (JPEG) and `depth` (PNG); `distance` holds the curves; `about` what `wsm inspect`
+prints.
 """
 
 import importlib
@@ -15,6 +16,7 @@ from tempfile import TemporaryDirectory
 from types import ModuleType
 from typing import Any
 
+import cv2
 import numpy as np
 
 from wsm_data.clips.decoded import DecodedVideo, decode_video
@@ -24,17 +26,20 @@ from wsm_data.files.atomic import write_bytes
 from wsm_data.files.digest import digest_json
 from wsm_data.files.json_values import to_json
 from wsm_data.geometry.transform import transforms_from_vectors
-from wsm_data.schema.arrays import Float64Array
+from wsm_data.schema.arrays import Float64Array, Uint16Array
 from wsm_data.schema.clip import Clip
 from wsm_data.schema.occupancy import UNKNOWN
 from wsm_data.view.clip.facts import clip_field_m, world_path_m
 from wsm_data.view.clip.map_plot import GOAL_COLOUR, PATH_COLOUR, UNKNOWN_COLOUR, cell_picture
 from wsm_data.view.clip.text import describe_clip
+from wsm_data.view.drawing.jpeg import jpeg
 
 TIMELINE = "frame"
 _APPLICATION = "wsm"
 _PINHOLE = "world/camera/pinhole"
 _LINE_RADIUS_M = 0.015
+_JPEG_QUALITY = 92
+_DEPTH_PER_M = 500.0  # steps of 2 mm: what the codec gets wrong is more, and finer steps do not compress
 _RING_CORNERS = 64
 _RING_LIFT_M = 0.01  # a ring in the plane of the map would flicker through it
 
@@ -42,8 +47,9 @@ _RING_LIFT_M = 0.01  # a ring in the plane of the map would flicker through it
 def write_rerun(clip: Clip, codec: VideoCodec, path: Path) -> None:
     """Write a recording of one clip. Padded still frames at its end are left out.
 
-    The camera moves along the stored poses in the world (z up, m). Depth is in metres and 0, that is no measurement, in
-    the latent cells of which less than half was measured. Intrinsics go in as they are: rerun projects depth with the
+    The camera moves along the stored poses in the world (z up, m). Depth is in steps of 2 mm and 0, that is no
+    measurement, in the latent cells of which less than half was measured; pictures are JPEGs, so a recording is two to
+    three times as large as its clip. Intrinsics go in as they are: rerun projects depth with the
     centre of the first pixel at (0, 0), as this project does. What rerun stamps on a recording (the time it was written
     and ids drawn from it) makes the bytes differ from run to run; the content and the recording's id do not.
 
@@ -86,24 +92,31 @@ def _still_entities(rr: ModuleType, clip: Clip) -> dict[str, Any]:
 
 
 def _image_formats(rr: ModuleType, clip: Clip) -> dict[str, Any]:
-    size = {"width": clip.intrinsics.width, "height": clip.intrinsics.height}
-    rgb = rr.components.ImageFormat(**size, color_model="RGB", channel_datatype="U8")
-    depth = rr.components.ImageFormat(**size, channel_datatype="F32")
-    depth_range_m = (clip.meta.depth_range.min_m, clip.meta.depth_range.max_m)
+    depth_range = (clip.meta.depth_range.min_m * _DEPTH_PER_M, clip.meta.depth_range.max_m * _DEPTH_PER_M)
     return {
-        f"{_PINHOLE}/rgb": rr.Image.from_fields(format=rgb),
-        f"{_PINHOLE}/depth": rr.DepthImage.from_fields(format=depth, meter=1.0, depth_range=depth_range_m),
+        f"{_PINHOLE}/rgb": rr.EncodedImage.from_fields(media_type="image/jpeg"),
+        f"{_PINHOLE}/depth": rr.EncodedDepthImage.from_fields(
+            media_type="image/png", meter=_DEPTH_PER_M, depth_range=depth_range
+        ),
     }
 
 
 def _images(rr: ModuleType, decoded: DecodedVideo) -> dict[str, tuple[int, Any]]:
     """What the latents decode to: entity path to first frame and columns."""
-    count = len(decoded.frames)
-    depth_m = np.where(decoded.measured, decoded.depth_m, np.float32(0)).astype("<f4")
+    depth_m = np.where(decoded.measured, decoded.depth_m, np.float32(0))
+    steps = np.round(np.clip(depth_m * _DEPTH_PER_M, 0, np.iinfo(np.uint16).max)).astype(np.uint16)
     return {
-        f"{_PINHOLE}/rgb": (0, rr.Image.columns(buffer=decoded.rgb.reshape(count, -1))),
-        f"{_PINHOLE}/depth": (0, rr.DepthImage.columns(buffer=depth_m.reshape(count, -1).view(np.uint8))),
+        f"{_PINHOLE}/rgb": (0, rr.EncodedImage.columns(blob=[jpeg(one, _JPEG_QUALITY) for one in decoded.rgb])),
+        f"{_PINHOLE}/depth": (0, rr.EncodedDepthImage.columns(blob=[_png16(one) for one in steps])),
     }
+
+
+def _png16(codes: Uint16Array) -> bytes:
+    """PNG of a grey image of 16 bits, as small as it gets: what a recording is made of, and nobody waits for."""
+    done, data = cv2.imencode(".png", codes, [cv2.IMWRITE_PNG_COMPRESSION, 9])
+    if not done:
+        raise OSError("OpenCV cannot write depth as PNG")
+    return data.tobytes()
 
 
 def _poses_and_curves(rr: ModuleType, clip: Clip) -> dict[str, tuple[int, Any]]:

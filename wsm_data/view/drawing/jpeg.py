@@ -1,4 +1,4 @@
-"""Pictures on their way to a page."""
+"""Pictures as JPEG, for pages and recordings."""
 
 import cv2
 import numpy as np
@@ -10,9 +10,9 @@ _QUALITY = 88
 _THUMBNAIL_PX = 320
 
 
-def jpeg(picture_u8: Uint8Array) -> bytes:
+def jpeg(picture_u8: Uint8Array, quality: int = _QUALITY) -> bytes:
     """JPEG of a picture, uint8 [H, W, 3]."""
-    return bytes(simplejpeg.encode_jpeg(np.ascontiguousarray(picture_u8), _QUALITY, "RGB", "444"))
+    return bytes(simplejpeg.encode_jpeg(np.ascontiguousarray(picture_u8), quality, "RGB", "444"))
 
 
 def thumbnail(picture_u8: Uint8Array) -> bytes:

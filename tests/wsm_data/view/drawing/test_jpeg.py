@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import simplejpeg
 
-from wsm_data.view.browser.jpeg import jpeg, thumbnail
+from wsm_data.view.drawing.jpeg import jpeg, thumbnail
 
 RAMP = np.broadcast_to(np.linspace(0, 255, 640).astype(np.uint8)[None, :, None], (360, 640, 3))
 
