@@ -11,7 +11,7 @@ DEMO_OUT ?= runs/demo
 PYTEST_WORKERS ?= auto
 PYTEST_OPTIONS ?=
 
-.PHONY: demo test check bench faults
+.PHONY: demo test check bench faults site
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/.ready
@@ -26,6 +26,10 @@ check: $(VENV)/.ready-dev
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# The documentation as a site, in build/site; what a page links to must be there.
+site: $(VENV)/.ready-dev
+	$(BIN)/python docs/site/build.py
 
 # Kills, damages and mishaps in full number; what was planted is counted at the end.
 faults: $(VENV)/.ready-dev
