@@ -27,6 +27,12 @@ Slurm = Annotated[
     list[str] | None,
     typer.Option("--slurm", help="With --engine slurm, what a job asks for: partition=gpu, time_min=120. Repeatable."),
 ]
+UnitTimeout = Annotated[
+    float,
+    typer.Option(
+        "--unit-timeout", min=0, help="Seconds in which a worker must settle a unit, or it hangs; 0: no limit."
+    ),
+]
 Limit = Annotated[int, typer.Option("--limit", min=0, help="At most this many pending units; 0: all.")]
 Only = Annotated[
     list[str] | None, typer.Option("--only", help="Only units whose id matches, as 'gibson_*/*'. Repeatable.")

@@ -24,6 +24,7 @@ from pipelines.commands.options import (
     RetryReasons,
     RetryRefused,
     Slurm,
+    UnitTimeout,
     Verbose,
     Workers,
 )
@@ -37,6 +38,7 @@ _OF_REQUEST: Mapping[str, object] = {
     "assignments": Assignments,
     "engine": Engine,
     "slurm": Slurm,
+    "unit_timeout": UnitTimeout,
     "log_file": LogFile,
 }
 _OF_RUN: Mapping[str, object] = {

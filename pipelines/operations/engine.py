@@ -16,4 +16,4 @@ def engine_of(request: StageRequest) -> AbstractContextManager[Engine]:
         ConfigError: when it is opened: it cannot work here, or is asked for what there is not.
     """
     slurm = build_config(SlurmConfig, parse_assignments(request.slurm), "slurm") if request.slurm else None
-    return opened(request.engine, slurm)
+    return opened(request.engine, slurm, request.unit_timeout)

@@ -58,6 +58,8 @@ class StageRequest:
         assignments: `key=value` words of `--set`.
         engine: who runs the workers.
         slurm: `key=value` words of `--slurm`: what is asked of Slurm.
+        unit_timeout: seconds after which a local worker that settled no unit is taken to hang, is killed, and its task
+            begun again; 0 for never.
         log_file: file to which a line a unit, warnings, tables and errors are added; None for none.
         options: what to run now.
     """
@@ -67,6 +69,7 @@ class StageRequest:
     assignments: tuple[str, ...] = ()
     engine: EngineName = EngineName.LOCAL
     slurm: tuple[str, ...] = ()
+    unit_timeout: float = 0.0
     log_file: Path | None = None
     options: RunOptions = field(default_factory=lambda: RunOptions(workers=0))
 

@@ -293,6 +293,11 @@ def _process_batch(
         for unit in left.values():
             yield replace(refused(unit, error), seconds=time.perf_counter() - started)
         return
+    except MemoryError as error:
+        raise WsmError(
+            f"memory ran out at {next(iter(left), stage.name)}; what is finished is kept: run the same command again, "
+            "with fewer --workers or on a machine with more memory"
+        ) from error
     if left:
         raise RuntimeError(f"{stage.name} gave no outcome for {', '.join(left)}")
 

@@ -14,6 +14,11 @@ BEGIN, END = "<!-- written by tests/faults/table.py -->", "<!-- end -->"
 KINDS = (
     ("killed between any two steps to the disk", "goes on to the same bytes", "tests/faults/test_killed_runs.py"),
     ("full disk, dead worker, Ctrl-C in a stage", "one sentence; goes on", "tests/faults/test_interrupted_runs.py"),
+    (
+        "worker killed or hanging (`--unit-timeout`), memory eaten, clock an hour off",
+        "done again by another worker, or one sentence; the same bytes",
+        "tests/faults/test_mishaps_of_workers.py",
+    ),
     ("ranks of a training killed", "no clip lost or seen twice", "tests/faults/test_killed_training.py"),
     (
         "file of a run flipped, cut or swapped",

@@ -6,11 +6,15 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
 from enum import StrEnum
 from functools import partial
+from math import inf
 from typing import Protocol
 
 from pipelines.running.engines.slurm_config import SlurmConfig
 from pipelines.running.engines.task import ResultT, TaskT
 from wsm_data.errors import ConfigError
+
+_ATTEMPTS = 3
+"""Of a task whose local worker dies or hangs, as of one that ray or Slurm loses."""
 
 
 class Engine(Protocol):
@@ -34,12 +38,13 @@ class EngineName(StrEnum):
 
 
 @contextmanager
-def opened(name: str, slurm: SlurmConfig | None = None) -> Iterator[Engine]:
+def opened(name: str, slurm: SlurmConfig | None = None, unit_timeout_s: float = 0.0) -> Iterator[Engine]:
     """The engine of a name, for all stages of a run.
 
     Args:
         name: the engine.
         slurm: what is asked of Slurm.
+        unit_timeout_s: a local worker hangs that settles no unit for so long, s; 0 where they are not watched.
 
     Raises:
         ConfigError: there is no such engine, its extra is not installed, it cannot work on this machine, or Slurm is
@@ -47,11 +52,13 @@ def opened(name: str, slurm: SlurmConfig | None = None) -> Iterator[Engine]:
     """
     if slurm is not None and name != EngineName.SLURM:
         raise ConfigError(f"--slurm is for --engine slurm, found {name}; leave it out")
+    if unit_timeout_s and name != EngineName.LOCAL:
+        raise ConfigError(f"--unit-timeout is for --engine local, found {name}; Slurm takes --slurm time_min=MINUTES")
     match name:
         case EngineName.LOCAL:
             from pipelines.running.engines.local import run_local
 
-            yield run_local
+            yield partial(run_local, attempts=_ATTEMPTS, silence_s=unit_timeout_s or inf)
         case EngineName.RAY:
             _require_extra("ray", "ray")
             from pipelines.running.engines.ray import ray_session, run_ray

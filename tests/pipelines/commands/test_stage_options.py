@@ -15,6 +15,7 @@ from pipelines.running.engines.choice import EngineName
 from pipelines.running.options import RunOptions, StageRequest
 
 ASKED = {
+    "--unit-timeout 60": {"unit_timeout": 60.0},
     "--slurm partition=gpu --slurm time_min=5": {"slurm": ("partition=gpu", "time_min=5")},
     "-o there": {"out": Path("there")},
     "--config my.toml": {"config": Path("my.toml")},
@@ -34,7 +35,7 @@ ASKED = {
     "-v": {"verbose": True},
     "--log-file /dev/null": {"log_file": Path("/dev/null")},
 }
-REQUESTED = ("out", "config", "assignments", "engine", "slurm", "log_file")
+REQUESTED = ("out", "config", "assignments", "engine", "slurm", "unit_timeout", "log_file")
 
 
 def request(**changes):

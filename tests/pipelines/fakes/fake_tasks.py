@@ -68,6 +68,13 @@ def die_once(mark: str) -> Iterator[tuple[str, int]]:
     yield mark, 1
 
 
+def hang_once(mark: str) -> Iterator[str]:
+    if not Path(mark).exists():
+        Path(mark).touch()
+        time.sleep(600)
+    yield mark
+
+
 def fail_to_pickle(_: object) -> Iterator[object]:
     yield lambda: None
 

@@ -2,6 +2,7 @@
 
 import importlib.util
 import shutil
+from math import inf
 
 import pytest
 
@@ -15,7 +16,14 @@ from wsm_data.errors import ConfigError
 
 def test_the_local_engine_is_always_there():
     with opened("local") as engine:
-        assert engine is run_local
+        assert (engine.func, engine.keywords) == (run_local, {"attempts": 3, "silence_s": inf})
+    with opened("local", unit_timeout_s=60.0) as engine:
+        assert engine.keywords["silence_s"] == 60.0
+
+
+def test_units_are_timed_by_the_local_engine_alone():
+    with pytest.raises(ConfigError, match="Slurm takes --slurm time_min=MINUTES"), opened("ray", unit_timeout_s=1.0):
+        pass
 
 
 def test_an_unknown_engine_is_refused_with_the_known_ones():

@@ -8,7 +8,20 @@ import sys
 import time
 
 import pytest
-from fake_tasks import die, fail, loaded_modules, numbers_below, parent_process_id, process_id, refuse, zeros
+from fake_tasks import (
+    die,
+    die_at_one,
+    die_once,
+    fail,
+    hang_once,
+    loaded_modules,
+    numbers_below,
+    parent_process_id,
+    process_id,
+    refuse,
+    wait_and_touch,
+    zeros,
+)
 
 from pipelines.running.engines.local import run_local
 from wsm_data.errors import DataError, Reason, WsmError
@@ -50,6 +63,41 @@ def test_a_bug_arrives_with_the_traceback_of_the_worker():
 def test_a_worker_that_dies_is_told_with_its_exit_code():
     with pytest.raises(WsmError, match=r"a worker process died \(exit code 9;"):
         list(run_local([1, 2], die, 2))
+
+
+def test_a_task_whose_worker_was_killed_is_begun_again_where_that_is_asked_for(tmp_path):
+    marks = [str(tmp_path / name) for name in "ab"]
+    found = list(run_local(marks, die_once, 2, attempts=2))
+    assert set(found) == {(mark, number) for mark in marks for number in range(2)}
+
+
+def test_a_task_that_kills_its_worker_each_time_ends_the_run_after_the_others_are_done():
+    found = []
+    with pytest.raises(WsmError, match=r"exit code 9; .*, 2 times at the same units; what was finished is kept"):
+        found.extend(collect(run_local([1, 0, 2, 3], die_at_one, 2, attempts=2), found))
+    assert sorted(set(found)) == [0, 1, 2, 3]
+
+
+def collect(results, found):
+    """Keeps what came before an error."""
+    for result in results:
+        found.append(result)
+    return ()
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_worker_that_hangs_is_killed_and_what_it_was_at_is_begun_again(tmp_path, workers):
+    marks = [str(tmp_path / name) for name in "ab"]
+    started = time.monotonic()
+    assert sorted(run_local(marks, hang_once, workers, attempts=2, silence_s=1.0)) == marks
+    assert time.monotonic() - started < 100  # it would sleep for 600 s
+    assert multiprocessing.active_children() == []
+
+
+def test_a_worker_that_hangs_each_time_ends_the_run(tmp_path):
+    with pytest.raises(WsmError, match=r"a unit hung for 0\.3 s, 2 times at the same units"):
+        list(run_local([str(tmp_path / "mark")], wait_and_touch, 1, attempts=2, silence_s=0.3))
+    assert multiprocessing.active_children() == []
 
 
 FAILING_PARENT = """
