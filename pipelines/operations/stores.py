@@ -11,6 +11,7 @@ from wsm_data.access.derived.merge import merge_releases
 from wsm_data.access.release import open_release, read_manifest
 from wsm_data.access.transfer.card import CARD_NAME, dataset_card
 from wsm_data.access.transfer.config import PublishConfig
+from wsm_data.access.transfer.croissant import CROISSANT_NAME, croissant
 from wsm_data.access.transfer.fetch import fetch_release
 from wsm_data.access.transfer.publish import publish_release
 from wsm_data.curation.attached import attached_names
@@ -34,7 +35,8 @@ def publish(release: Path, url: str, config: PublishConfig, quiet: bool) -> None
     opened = open_release(release)
     total = sum(shard.bytes for shard in opened.manifest.shards)
     with tqdm(total=total, unit="B", unit_scale=True, desc="publish", disable=quiet, dynamic_ncols=True) as bar:
-        moved = publish_release(release, url, config, {CARD_NAME: dataset_card(opened).encode()}, bar.update)
+        about = {CARD_NAME: dataset_card(opened).encode(), CROISSANT_NAME: croissant(opened).encode()}
+        moved = publish_release(release, url, config, about, bar.update)
     typer.echo(
         f"{url} holds {opened.manifest.name}, {len(opened)} clips: {moved.moved_files} of {moved.files} files were "
         f"sent ({moved.moved_bytes:,} bytes), the others were there"
