@@ -15,7 +15,7 @@ from pipelines.commands import audit, audit_run, bench, inspect, run, serve, set
 from pipelines.commands.clips import export, film, view
 from pipelines.commands.command import Command, CommandGroup
 from pipelines.commands.evaluating import group as evaluate
-from pipelines.commands.models import dream
+from pipelines.commands.models import dream, posttrain
 from pipelines.commands.models import group as models
 from pipelines.commands.runs import clean, plan, retry
 from pipelines.commands.soundness import audit_latents, check, preflight
@@ -48,6 +48,7 @@ COMMANDS: tuple[Command | CommandGroup, ...] = (
     audit_run.COMMAND,
     audit.COMMAND,
     train.COMMAND,
+    posttrain.COMMAND,
     evaluate.GROUP,
     dream.COMMAND,
     models.GROUP,

@@ -229,7 +229,7 @@ def _cause(error: BaseException) -> str:
 
 def _tensors(model: nn.Module, optimiser: torch.optim.Optimizer, average: Mapping[str, Tensor]) -> dict[str, Tensor]:
     tensors: dict[str, Tensor] = {f"average.{name}": tensor for name, tensor in average.items()}
-    for name, parameter in model.named_parameters():
+    for name, parameter in model.named_parameters():  # those that do not learn, too: they have no moments
         tensors[f"model.{name}"] = parameter.detach()
         for moment in _MOMENTS:
             if moment in optimiser.state[parameter]:
@@ -251,7 +251,7 @@ def _files_of(tensors: Mapping[str, Tensor], world_size: int) -> dict[str, int]:
 
 def _prepare_moments(model: nn.Module, optimiser: torch.optim.Optimizer, step: int) -> None:
     """Give the optimiser the state it has after `step` steps, for the moments to be read into."""
-    for parameter in model.parameters():
+    for parameter in (one for one in model.parameters() if one.requires_grad):
         moments = {moment: torch.zeros_like(parameter) for moment in _MOMENTS}
         count = torch.tensor(float(step), device=parameter.device)  # where a fused step looks for it
         optimiser.state[parameter] = {"step": count, **moments} if step else {}
