@@ -9,7 +9,7 @@ from pipelines.commands.command import Command
 
 def settings(
     stage: Annotated[
-        str | None, typer.Argument(metavar="[STAGE]", help="A stage, or train; without it, all of them.")
+        str | None, typer.Argument(metavar="[STAGE]", help="A stage, train or posttrain; without it, all of them.")
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="As JSON, a list by stage.")] = False,
     as_markdown: Annotated[bool, typer.Option("--markdown", help="As the page docs/settings.md.")] = False,

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
+from importlib import import_module
 
 import typer
 
@@ -11,11 +12,16 @@ from pipelines.running.described_settings import Setting, describe_settings
 from wsm_data.errors import ConfigError
 from wsm_data.files.typed_toml import did_you_mean
 
-_TRAIN = "train"
+_OF_MODELS: Mapping[str, tuple[str, str]] = {
+    "train": ("pipelines.training.config", "TrainRunConfig"),
+    "posttrain": ("pipelines.posttraining.config", "PosttrainRunConfig"),
+}
+"""They bring torch, for which settings of a stage need not wait."""
+
 _HEAD = """# Settings
 
-All settings of the stages and of `wsm train`, as `wsm settings` prints them. This page is written by
-`wsm settings --markdown > docs/settings.md`. The command of a stage takes a setting as it stands here
+All settings of the stages, of `wsm train` and of `wsm posttrain`, as `wsm settings` prints them. This page is written
+by `wsm settings --markdown > docs/settings.md`. The command of a stage takes a setting as it stands here
 (`wsm encode --set clip.width=640`); `wsm run` takes it behind the name of the stage (`--set encode.clip.width=640`).
 [pipeline.md](pipeline.md#settings) says which value wins. `[]` is a list of sections, `NAME` a name of your own.
 """
@@ -48,7 +54,7 @@ def settings_by_command(only: str | None = None) -> dict[str, tuple[Setting, ...
     Raises:
         ConfigError: there is no such command.
     """
-    known = [*(entry.name for entry in STAGES), _TRAIN]
+    known = [*(entry.name for entry in STAGES), *_OF_MODELS]
     if only is not None and only not in known:
         raise ConfigError(f"there is no stage {only!r}; {did_you_mean(only, known)}")
     return {name: tuple(describe_settings(_config_type(name))) for name in known if only in (None, name)}
@@ -60,11 +66,11 @@ def markdown_page(described: Mapping[str, Sequence[Setting]]) -> str:
 
 
 def _config_type(name: str) -> type:
-    if name != _TRAIN:
+    if name not in _OF_MODELS:
         return load_stage(name).config_type
-    from pipelines.training.config import TrainRunConfig  # it brings torch, for which settings of a stage need not wait
-
-    return TrainRunConfig
+    module, config = _OF_MODELS[name]
+    found: type = getattr(import_module(module), config)
+    return found
 
 
 def _text(name: str, settings: Iterable[Setting]) -> str:

@@ -39,6 +39,7 @@ def test_every_stage_is_in_the_tour():
         "docs/model.md",
         "docs/stores.md",
         "docs/cluster.md",
+        "docs/posttraining.md",
     ],
 )
 def test_every_option_in_the_documentation_exists(page):
@@ -46,7 +47,7 @@ def test_every_option_in_the_documentation_exists(page):
     options = set(re.findall(r"(?<![\w-])--[a-z][a-z-]+", text))
     options -= {"--nproc-per-node", "--generate"}  # of torchrun, of ray
     commands = ("run", "status", "inspect", "view", "film", "verify", "select", "audit", "audit-run", "bench loader")
-    commands += ("export tum", "clean", "retry", "export lerobot")
+    commands += ("export tum", "clean", "retry", "export lerobot", "posttrain")
     commands += ("train", "eval nav", "eval slam", "serve", "source describe", "source miniworld", "check", "preflight")
     commands += ("publish", "fetch", "merge", "plan")
     commands += ("audit-latents", "eval clips", "dream", "model export", "model push")

@@ -7,7 +7,7 @@ the SLAM expert, and its memory, stay as they were to the bit.
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from enum import StrEnum
 from pathlib import Path
 from typing import cast
@@ -19,6 +19,7 @@ from torch import Tensor, nn
 
 from wsm_data.files.atomic import write_text
 from wsm_model.model import WorldSlamModel
+from wsm_model.posttraining.config import AdapterConfig
 from wsm_model.posttraining.dream_attention import with_dream_attention
 
 ADAPTER_WEIGHTS = "adapter_model.safetensors"
@@ -32,23 +33,6 @@ class Policy(StrEnum):
 
     TRAINED = "default"
     OLD = "old"
-
-
-@dataclass(frozen=True, kw_only=True)
-class AdapterConfig:
-    """Size of the adapters (paper: rank 32, alpha 64, on q, k, v and o of the generation expert's self-attention).
-
-    Attributes:
-        rank: of the two matrices of each adapter.
-        alpha: their product is scaled by alpha / rank.
-    """
-
-    rank: int = 32
-    alpha: int = 64
-
-    def __post_init__(self) -> None:
-        if self.rank < 1 or self.alpha < 1:
-            raise ValueError(f"rank and alpha must be at least 1, found {self.rank} and {self.alpha}")
 
 
 class AdaptedModel:

@@ -3,11 +3,27 @@
 from dataclasses import dataclass, field
 
 from wsm_model.inference.session import SessionConfig
-from wsm_model.posttraining.adapters import AdapterConfig
 from wsm_model.posttraining.advantages import Spread
 from wsm_model.posttraining.objective import ObjectiveConfig
 from wsm_model.posttraining.reward import RewardConfig
 from wsm_model.training.config import LoopConfig, OptimiserConfig
+
+
+@dataclass(frozen=True, kw_only=True)
+class AdapterConfig:
+    """Size of the adapters (paper: rank 32, alpha 64, on q, k, v and o of the generation expert's self-attention).
+
+    Attributes:
+        rank: of the two matrices of each adapter.
+        alpha: their product is scaled by alpha / rank.
+    """
+
+    rank: int = 32
+    alpha: int = 64
+
+    def __post_init__(self) -> None:
+        if self.rank < 1 or self.alpha < 1:
+            raise ValueError(f"rank and alpha must be at least 1, found {self.rank} and {self.alpha}")
 
 
 @dataclass(frozen=True, kw_only=True)

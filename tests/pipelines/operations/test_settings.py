@@ -18,7 +18,7 @@ def described():
 
 
 def test_every_stage_and_training_is_described(described):
-    assert list(described) == [*(entry.name for entry in STAGES), "train"]
+    assert list(described) == [*(entry.name for entry in STAGES), "train", "posttrain"]
 
 
 def test_every_setting_has_a_meaning(described):

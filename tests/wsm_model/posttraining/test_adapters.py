@@ -3,7 +3,8 @@ import torch
 
 from wsm_model.inference.sampler import flow_schedule
 from wsm_model.inference.session import Session, SessionConfig
-from wsm_model.posttraining.adapters import ADAPTER_WEIGHTS, AdaptedModel, AdapterConfig, Policy
+from wsm_model.posttraining.adapters import ADAPTER_WEIGHTS, AdaptedModel, Policy
+from wsm_model.posttraining.config import AdapterConfig
 from wsm_model.posttraining.dream_attention import with_dream_attention
 
 peft = pytest.importorskip("peft")

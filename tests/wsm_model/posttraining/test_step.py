@@ -8,9 +8,9 @@ import pytest
 import torch
 
 from wsm_model.inference.session import SessionConfig
-from wsm_model.posttraining.adapters import AdaptedModel, AdapterConfig
+from wsm_model.posttraining.adapters import AdaptedModel
 from wsm_model.posttraining.advantages import Spread
-from wsm_model.posttraining.config import PosttrainingConfig
+from wsm_model.posttraining.config import AdapterConfig, PosttrainingConfig
 from wsm_model.posttraining.objective import ObjectiveConfig
 from wsm_model.posttraining.step import posttraining_step, roll_out_all
 from wsm_model.training.loop import TrainingRun
