@@ -1,5 +1,6 @@
 """`wsm`: the commands of `pipelines.commands`, and what becomes of their errors."""
 
+import errno
 import logging
 import sys
 from collections.abc import Callable
@@ -62,6 +63,10 @@ COMMANDS: tuple[Command | CommandGroup, ...] = (
 """In the order of `wsm --help`."""
 
 
+_OF_A_FILE = (errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ENAMETOOLONG)
+"""What the system says where a path that somebody named cannot be read or written: no fault of the program."""
+
+
 class _Commands(TyperGroup):
     """Turns foreseen errors into one message and their exit code; anything else keeps its traceback."""
 
@@ -77,9 +82,11 @@ class _Commands(TyperGroup):
         except KeyboardInterrupt:
             _fail("interrupted; run the same command again to go on where it stopped", INTERRUPTED_EXIT_CODE)
         except OSError as error:
-            if not is_full_disk(error):
+            if is_full_disk(error):
+                _fail(f"the disk is full ({error}); free space and run the same command again", 1)
+            if error.filename is None or error.errno not in _OF_A_FILE:
                 raise
-            _fail(f"the disk is full ({error}); free space and run the same command again", 1)
+            _fail(f"{error.filename} cannot be used ({error.strerror}); name another place, or restore this one", 1)
 
 
 def _fail(message: str, code: int) -> NoReturn:

@@ -13,4 +13,6 @@ def require_extra(extra: str, packages: tuple[str, ...]) -> None:
     """
     missing = [name for name in packages if importlib.util.find_spec(name) is None]
     if missing:
-        raise ConfigError(f"this command needs {', '.join(missing)}: install wsm with the extra `{extra}`")
+        raise ConfigError(
+            f"this command needs {', '.join(missing)}: install the extra in a clone with: pip install -e '.[{extra}]'"
+        )

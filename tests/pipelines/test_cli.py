@@ -1,5 +1,6 @@
 """`wsm` as a person meets it: exit codes, one message instead of a traceback, options, help."""
 
+import errno
 import json
 import signal
 import subprocess
@@ -10,6 +11,9 @@ from pathlib import Path
 
 import pytest
 from fake_runs import environment
+from typer.testing import CliRunner
+
+from pipelines.cli import app
 
 
 @pytest.fixture(scope="module")
@@ -90,6 +94,19 @@ def test_a_full_disk_is_a_message_and_exit_code_1(wsm, source):
     assert done.returncode == 1
     assert done.stderr.startswith("error: the disk of out is full")
     assert "Traceback" not in done.stderr
+
+
+def test_a_place_that_cannot_be_used_is_a_message_and_another_error_of_the_system_is_not(monkeypatch):
+    raised = [PermissionError(errno.EACCES, "Permission denied", "far/clip.png"), OSError(errno.EBADF, "no file", "x")]
+
+    def refuse(*_):
+        raise raised.pop(0)
+
+    monkeypatch.setattr("pipelines.operations.status.show_status", refuse)
+    told = CliRunner().invoke(app, ["status", "."])
+    assert told.exit_code == 1
+    assert told.stderr.startswith("error: far/clip.png cannot be used (Permission denied)")
+    assert isinstance(CliRunner().invoke(app, ["status", "."]).exception, OSError)
 
 
 def test_a_bug_keeps_its_traceback(wsm, source):

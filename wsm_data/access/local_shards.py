@@ -33,7 +33,11 @@ class LocalShards:
         """
         file = self._open(shard)
         wanted = Span(shard, offset, sum(buffer.nbytes for buffer in buffers))
-        if read_scattered(file.descriptor, offset, buffers) < wanted.size:
+        try:
+            read = read_scattered(file.descriptor, offset, buffers)
+        except OSError as error:  # an open file does not know its name
+            raise OSError(error.errno, error.strerror, f"{self._root}/{shard}") from error
+        if read < wanted.size:
             raise short_shard(self._root, wanted, os.fstat(file.descriptor).st_size)
 
     def expect(self, spans: Sequence[Span]) -> None:

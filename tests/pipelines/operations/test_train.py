@@ -167,7 +167,7 @@ def test_a_missing_extra_is_named(release, tmp_path, monkeypatch):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == "tensorboard" else object())
     code, text = wsm("train", release, "--out", str(tmp_path / "run"))
     assert code == 2
-    assert "needs tensorboard: install wsm with the extra `train`" in text
+    assert "needs tensorboard: install the extra in a clone with: pip install -e '.[train]'" in text
 
 
 @pytest.mark.slow

@@ -176,7 +176,7 @@ def _import_rerun() -> ModuleType:
         return importlib.import_module("rerun")
     except ModuleNotFoundError as error:
         raise ConfigError(
-            f"a rerun recording needs the package {error.name}; install the extra: pip install 'wsm[viz]'"
+            f"a rerun recording needs the package {error.name}; install the extra: pip install -e '.[viz]' in a clone"
         ) from error
 
 

@@ -58,6 +58,7 @@ def write_film(path: Path, grid: OccupancyGrid, goal_m: Float64Array, frames: It
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.stem}.{token_hex(8)}{TEMPORARY_SUFFIX}.mp4")
+    temporary.touch()  # says what keeps a file from being there; OpenCV says nothing
     size = (2 * _PICTURE_PX[0], _PICTURE_PX[1] + _MAP_HEIGHT_PX)
     writer = cv2.VideoWriter(str(temporary), cv2.VideoWriter.fourcc(*"mp4v"), _FRAMES_PER_S, size)
     if not writer.isOpened():

@@ -199,7 +199,9 @@ def test_a_refused_clip_leaves_the_old_recording(turned, made, tmp_path):
 
 def test_without_rerun_the_extra_is_named(turned, made, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "rerun", None)  # an import of it then fails as if it were not installed
-    with pytest.raises(ConfigError, match=r"needs the package rerun; install the extra: pip install 'wsm\[viz\]'"):
+    with pytest.raises(
+        ConfigError, match=r"needs the package rerun; install the extra: pip install -e '\.\[viz\]' in a clone"
+    ):
         write_rerun(turned, made.codec, tmp_path / "clip.rrd")
 
 
