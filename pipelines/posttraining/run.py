@@ -51,19 +51,12 @@ from wsm_model.posttraining.config import PosttrainingConfig
 from wsm_model.posttraining.rollout import Query
 from wsm_model.posttraining.step import posttraining_step, roll_out_all
 from wsm_model.ranks import leave_ranks, rank_and_world_size, start_ranks, wait_for_all
+from wsm_model.training.config import LoopConfig
 from wsm_model.training.loop import StepResult, TrainingRun, resume, train
 from wsm_model.training.schedule import make_optimiser
 
 ADAPTER, MODEL = "adapter", "model"
-_NOT_PART_OF_A_RUN = (
-    "epochs",
-    "max_steps",
-    "checkpoint_every",
-    "keep_checkpoints",
-    "log_every",
-    "sample_every",
-    "evaluate_every",
-)
+_NOT_PART_OF_A_RUN = {one.name for one in dataclasses.fields(LoopConfig)} - {"optimiser"}
 """Settings that may change between two parts of a run: none of them changes what a step learns."""
 
 
