@@ -175,7 +175,8 @@ def test_killed_at_random_moments_a_run_still_ends_as_undisturbed(
         faults["kills of runs"] += 1
     run_stage(COPY, CopyConfig(source=source), out, replace(OPTIONS, workers=workers))
     run_stage(COPY, CopyConfig(source=source), undisturbed, OPTIONS)
-    resumed, whole = state(out), state(undisturbed)
+    # a worker outlives its killed driver by the unit it is at: what it writes then has the same bytes
+    resumed, whole = without_temporaries(state(out)), state(undisturbed)
     assert {name: resumed[name] for name in resumed if name != "stage.json"} == {
         name: whole[name] for name in whole if name != "stage.json"
     }

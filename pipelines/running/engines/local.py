@@ -199,11 +199,12 @@ def _start(work: Callable[[TaskT], Iterator[ResultT]]) -> tuple[Connection, Base
 def _worker(work: Callable[[TaskT], Iterator[ResultT]], connection: Connection) -> None:
     threading.Thread(target=_end_with_parent, daemon=True).start()
     limit_threads()
-    while True:
-        task = connection.recv()
-        for result in results_of(work, task):
-            connection.send(result)
-        connection.send(_TaskEnded())
+    with suppress(EOFError, BrokenPipeError, ConnectionResetError):  # the driver was killed: nobody is there to be told
+        while True:
+            task = connection.recv()
+            for result in results_of(work, task):
+                connection.send(result)
+            connection.send(_TaskEnded())
 
 
 def _end_with_parent() -> None:
